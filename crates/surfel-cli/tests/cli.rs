@@ -42,6 +42,8 @@ mod invalid_input;
 mod invalid_scenes;
 #[path = "cli/invalid_options.rs"]
 mod invalid_options;
+#[path = "cli/without_effect.rs"]
+mod without_effect;
 #[cfg(unix)]
 #[path = "cli/interrupt.rs"]
 mod interrupt;

@@ -5,15 +5,17 @@ use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
     MemoryEstimate, check_empty, keep_matching, report_denoise, report_normals, report_radii,
+    report_unused_of_files,
 };
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use surfel_core::points::{
     Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, denoise, prepare,
     select_points,
 };
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
-use surfel_formats::{ColumnChoice, LoadOptions, Loaded, merge_loaded};
+use surfel_formats::{ColumnChoice, FileInfo, LoadOptions, Loaded, merge_loaded};
 
 /// Columns that a prepared cloud gets besides those that follow from the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,10 +92,11 @@ fn load(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let inspected = files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
-    let infos = inspected.collect::<surfel_formats::Result<_>>()?;
+    let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
     let preparation = &description.objects_default.preparation;
     let estimate = MemoryEstimate::from_files(&infos, preparation.subsample, 0);
     estimate.check(description.run.memory_limit)?;
+    report_unused_of_files(infos.values(), preparation, progress);
     let options = preparation.load_options(ColumnChoice::All)?;
     let mut loaded = match preparation.reproject {
         Some(true) => load_in_metres(files, &options, progress)?,

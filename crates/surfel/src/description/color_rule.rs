@@ -1,7 +1,9 @@
 //! Rules of colours: single ones, backgrounds, and what colours points.
 
 use super::Invalid;
+use super::nearest::nearest_if_any;
 use super::rule::{Rule, as_list, expected, from_core};
+use csscolorparser::NAMED_COLORS;
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_core::image::{Colormap, decode_srgb8, encode_srgb};
@@ -17,7 +19,8 @@ const COLOR: &str = "a colour as in #aabbcc or steelblue";
 impl Rule<Vec3> for Color {
     fn read(&self, value: &Value, _: &Path) -> Result<Vec3, Invalid> {
         let color = value.as_str().and_then(srgb_color);
-        color.map(to_linear).ok_or_else(|| expected(COLOR))
+        let advice = || nearest_colors(std::slice::from_ref(value));
+        color.map(to_linear).ok_or_else(|| expected(format_args!("{COLOR}{}", advice())))
     }
 
     fn write(&self, value: &Vec3) -> Value {
@@ -33,6 +36,13 @@ pub fn srgb_color(text: &str) -> Option<[u8; 3]> {
     let color = (is_hex || is_name).then(|| csscolorparser::parse(text).ok())??;
     let [r, g, b, _] = color.to_rgba8();
     Some([r, g, b])
+}
+
+/// Advises on the first of some colours that is not known, by the nearest name of CSS; empty if none is near.
+fn nearest_colors(colors: &[Value]) -> String {
+    let mut texts = colors.iter().filter_map(Value::as_str);
+    let unknown = texts.find(|text| srgb_color(text).is_none()).unwrap_or_default();
+    nearest_if_any(unknown, NAMED_COLORS.keys().map(|name| name.as_str()))
 }
 
 fn to_linear(srgb: [u8; 3]) -> Vec3 {
@@ -65,15 +75,16 @@ impl Rule<Background> for BackgroundRule {
             Some("gradient") => return Ok(default_background()),
             _ => {}
         }
-        let colors = as_list(value);
+        let texts = as_list(value);
         let colors: Option<Vec<Vec3>> =
-            colors.iter().map(|color| color.as_str().and_then(srgb_color).map(to_linear)).collect();
+            texts.iter().map(|color| color.as_str().and_then(srgb_color).map(to_linear)).collect();
         match colors.as_deref() {
             Some(&[plain]) => Ok(Background::Gradient { top: plain, bottom: plain }),
             Some(&[top, bottom]) => Ok(Background::Gradient { top, bottom }),
-            _ => Err(expected(
-                "a colour as in #aabbcc or white, two colours (top, bottom), gradient, environment or transparent",
-            )),
+            _ => Err(expected(format_args!(
+                "a colour as in #aabbcc or white, two colours (top, bottom), gradient, environment or transparent{}",
+                nearest_colors(&texts)
+            ))),
         }
     }
 
@@ -140,6 +151,14 @@ mod tests {
         check(Color, "#89abcd");
         check(BackgroundRule, "#123456,#fedcba");
         check(ColorSourceRule, "surface_variation");
+    }
+
+    #[test]
+    fn an_unknown_colour_is_answered_with_the_nearest_name() {
+        let error = read(BackgroundRule, "white,lightgrren").unwrap_err();
+        assert!(error.ends_with("; the nearest known one is `lightgreen`"), "{error}");
+        assert!(read(Color, "stelblue").unwrap_err().contains("`steelblue`"));
+        assert!(!read(Color, "#12345").unwrap_err().contains("nearest"));
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Settings that choose points by their columns, and the filter that they make together.
 
 use super::Invalid;
-use super::rule::{Rule, as_list};
+use super::nearest::nearest_if_any;
+use super::rule::{Rule, as_list, expected};
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_core::image::class_name;
@@ -33,12 +34,17 @@ impl Rule<Vec<u8>> for Classes {
                 other => other.to_string(),
             };
             let named = || (0..=u8::MAX).find(|class| class_name(*class) == text);
-            text.parse().ok().or_else(named)
+            text.parse().ok().or_else(named).ok_or(text)
         };
-        let classes: Option<Vec<u8>> = as_list(value).iter().map(class).collect();
-        classes.filter(|classes| !classes.is_empty()).ok_or_else(|| {
-            Invalid::new("expected numbers or names of ASPRS classes, as in 2,6 or ground,building")
-        })
+        let invalid = |unknown: &str| {
+            let advice = nearest_if_any(unknown, (0..=u8::MAX).map(class_name));
+            expected(format_args!(
+                "numbers or names of ASPRS classes, as in 2,6 or ground,building{advice}"
+            ))
+        };
+        let classes: Result<Vec<u8>, String> = as_list(value).iter().map(class).collect();
+        let classes = classes.map_err(|unknown| invalid(&unknown))?;
+        if classes.is_empty() { Err(invalid("")) } else { Ok(classes) }
     }
 
     fn write(&self, value: &Vec<u8>) -> Value {

@@ -3,7 +3,7 @@
 //! Text is also what a command line gives, so `"1,2,3"` and `[1, 2, 3]` are the same vector to every door.
 
 use super::Invalid;
-use super::nearest::nearest;
+use super::nearest::nearest_if_any;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf, absolute};
 use std::str::FromStr;
@@ -189,7 +189,9 @@ impl<T: FromStr<Err = surfel_core::Error>> Rule<T> for Parsed<T> {
 /// Says what the library expected.
 pub fn from_core(error: surfel_core::Error) -> Invalid {
     match error {
-        surfel_core::Error::Setting { expected: what, .. } => expected(what),
+        surfel_core::Error::Setting { found, expected: what, .. } => {
+            expected(format_args!("{what}{}", nearest_word(&found, what)))
+        }
         surfel_core::Error::UnknownName { found, known, .. } => {
             expected(format_args!("one of {known}{}", did_you_mean(&found, &known)))
         }
@@ -197,9 +199,15 @@ pub fn from_core(error: surfel_core::Error) -> Invalid {
     }
 }
 
+/// Advises on a text by the nearest of the names in a list as `auto, none or viewpoint:x,y,z`; empty if none is near.
+fn nearest_word(found: &str, list: &str) -> String {
+    let items = list.split(", ").flat_map(|items| items.split(" or "));
+    let names = items.filter_map(|item| item.split(':').next());
+    nearest_if_any(found, names.filter(|name| !name.contains(' ')))
+}
+
 fn did_you_mean(found: &str, known: &str) -> String {
-    let advice = nearest(found, known.split(", "));
-    if advice.starts_with("; the nearest") { advice } else { String::new() }
+    nearest_if_any(found, known.split(", "))
 }
 
 /// One of a few names.

@@ -34,6 +34,7 @@ pub use cloud::{
 pub(crate) use common_legend::common_legend;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
+pub(crate) use loaded::report_unused_of_files;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
 pub use memory::{MemoryEstimate, n_points};
 pub use plan::coordinate_system;

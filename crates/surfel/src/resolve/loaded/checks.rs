@@ -4,11 +4,10 @@ use super::super::check_files::n_pixels;
 use super::super::cloud::can_be_colored;
 use super::super::memory::MemoryEstimate;
 use super::LoadedScene;
-use crate::description::{PreparationSettings, SceneDescription, nearest_if_any};
+use crate::description::{SceneDescription, nearest_if_any};
 use crate::error::{Error, Result};
 use crate::names::list_files;
 use surfel_core::points::{STRUCTURE, SURFACE_VARIATION};
-use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
 use surfel_core::scene::Geometry;
 use surfel_core::scene::color::ColorSource;
@@ -65,28 +64,6 @@ impl LoadedScene {
             )));
         }
         Ok(())
-    }
-
-    /// Warns of settings that choose or colour points in a scene without points.
-    pub(super) fn report_unused(&self, description: &SceneDescription, progress: &dyn Progress) {
-        if self.graph.geometries.is_empty() || self.clouds().next().is_some() {
-            return;
-        }
-        let settings = &description.objects_default;
-        let PreparationSettings { filter, class, returns, .. } = &settings.preparation;
-        let all = [
-            ("color", settings.color.color.is_some()),
-            ("filter", filter.is_some()),
-            ("class", class.is_some()),
-            ("returns", returns.is_some()),
-        ];
-        let keys: Vec<&str> =
-            all.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
-        if !keys.is_empty() {
-            let line = "warning: settings for points do not change triangles, which keep the colours of their \
-                        materials and vertices";
-            progress.choice(line, &keys);
-        }
     }
 }
 

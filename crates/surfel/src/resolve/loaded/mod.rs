@@ -3,6 +3,9 @@
 mod add_content;
 mod checks;
 mod filtered;
+mod without_effect;
+
+pub(crate) use without_effect::report_unused_of_files;
 
 use super::camera::{camera_motion, keep_named_camera};
 use super::check_files::check_files;

@@ -1,0 +1,65 @@
+//! Options that have no effect on a file or a scene: a warning says why.
+
+use super::common::{Folder, SMALL, dome, stderr, succeed, surfel};
+
+/// Returns the warnings of a run, which must succeed.
+fn warnings(arguments: &[&str]) -> Vec<String> {
+    let output = surfel(arguments);
+    let text = stderr(&output);
+    assert!(output.status.success(), "{arguments:?}: {text}");
+    text.lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect()
+}
+
+#[test]
+fn options_that_a_file_cannot_hold_are_warned_of() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    for (name, options, expected) in [
+        ("a.jpg", &["--bit-depth", "16"][..], &["no effect on .jpg: only .png and .tif"][..]),
+        (
+            "a.jpg",
+            &["--background", "transparent"],
+            &[".jpg has no transparency: the background is white"],
+        ),
+        ("a.webp", &["--dpi", "200"], &["200 pixels per inch are not stated in the file"]),
+        ("a.png", &["--dpi", "200"], &["stated in the file alone: without a scale"]),
+        ("a.tif", &["--bit-depth", "16", "--no-background"], &[]),
+        ("a.png", &["--dpi", "200", "--bit-depth", "8"], &["stated in the file alone"]),
+    ] {
+        let picture = folder.path(name);
+        let arguments = [&["render", &cloud, "-o", &picture], &SMALL[..], options].concat();
+        let found = warnings(&arguments);
+        let matches = found.iter().zip(expected).all(|(line, text)| line.contains(text));
+        assert!(found.len() == expected.len() && matches, "{name} {options:?}: {found:?}");
+    }
+    let movie = folder.path("a.gif");
+    let movie = ["animate", &cloud, "-o", &movie, "--frames", "1"];
+    let found = warnings(&[&movie, &SMALL[..], &["--no-background"]].concat());
+    assert!(found[0].contains(".gif has no transparency: the background is black"), "{found:?}");
+}
+
+#[test]
+fn options_for_other_files_and_surfaces_are_warned_of() {
+    let folder = Folder::new();
+    let ply = folder.write("dome.ply", dome(10));
+    let text = folder.path("dome.xyz");
+    succeed(&["prepare", &ply, "-o", &text, "--duplicates", "keep"]);
+    let picture = folder.path("a.png");
+    let render = |cloud: &str, options: &[&str]| {
+        warnings(&[&["render", cloud, "-o", &picture], &SMALL[..], options].concat())
+    };
+    for (options, expected) in [
+        (&["--columns", "x,y,z"][..], "no effect, since no file is text"),
+        (&["--animation-name", "walk"], "no effect, since no file is glTF"),
+        (&["--surface", "points", "--material", "mirror"], "the surface points shows nothing of a"),
+    ] {
+        let found = render(&ply, options);
+        assert!(found.len() == 1 && found[0].contains(expected), "{options:?}: {found:?}");
+    }
+    let columns = ["--columns", "x,y,z,red,green,blue,class,rain"];
+    assert_eq!(render(&text, &columns), [""; 0]);
+    assert_eq!(render(&ply, &["--surface", "points", "--material", "unlit"]), [""; 0]);
+    let prepared = folder.path("b.ply");
+    let found = warnings(&[&["prepare", &ply, "-o", &prepared], &columns[..]].concat());
+    assert!(found.len() == 1 && found[0].contains("[--columns]"), "{found:?}");
+}

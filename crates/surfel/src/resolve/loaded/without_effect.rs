@@ -1,0 +1,111 @@
+//! Warnings of settings that change nothing in the scene or in the file of its picture.
+
+use super::super::appearance::{material_of_file, material_of_object};
+use super::LoadedScene;
+use crate::description::{PreparationSettings, SceneDescription};
+use surfel_core::progress::Progress;
+use surfel_core::scene::Background;
+use surfel_core::surface::SurfaceKind;
+use surfel_formats::{BitDepth, FileInfo};
+
+impl LoadedScene {
+    /// Warns of settings that have no effect.
+    pub(super) fn report_unused(&self, description: &SceneDescription, progress: &dyn Progress) {
+        report_unused_of_output(description, progress);
+        let preparation = &description.objects_default.preparation;
+        report_unused_of_files(&self.file_infos, preparation, progress);
+        self.report_unused_materials(description, progress);
+        self.report_unused_of_points(description, progress);
+    }
+
+    /// Warns of materials of points that are drawn as pixels.
+    fn report_unused_materials(&self, description: &SceneDescription, progress: &dyn Progress) {
+        let is_unused = |i: usize| {
+            let material = match self.owners[i] {
+                Some(object) => material_of_object(description, &description.objects[object]),
+                None => self.files_of(i, description).first().and_then(|file| {
+                    material_of_file(description, file).map(|choice| &choice.material)
+                }),
+            };
+            let surface = self.settings_of(i, description).surface.surface();
+            let has_reflections = |kind: String| !["matte", "unlit"].contains(&kind.as_str());
+            surface == SurfaceKind::Points && material.is_some_and(|m| has_reflections(m.kind()))
+        };
+        if self.clouds().any(|(i, _)| is_unused(i)) {
+            let line = "warning: the surface points shows nothing of a material but its colour";
+            progress.choice(line, &["surface", "material"]);
+        }
+    }
+
+    /// Warns of settings that choose or colour points in a scene without points.
+    fn report_unused_of_points(&self, description: &SceneDescription, progress: &dyn Progress) {
+        if self.graph.geometries.is_empty() || self.clouds().next().is_some() {
+            return;
+        }
+        let settings = &description.objects_default;
+        let PreparationSettings { filter, class, returns, .. } = &settings.preparation;
+        let all = [
+            ("color", settings.color.color.is_some()),
+            ("filter", filter.is_some()),
+            ("class", class.is_some()),
+            ("returns", returns.is_some()),
+        ];
+        let keys: Vec<&str> =
+            all.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
+        if !keys.is_empty() {
+            let line = "warning: settings for points do not change triangles, which keep the colours of their \
+                        materials and vertices";
+            progress.choice(line, &keys);
+        }
+    }
+}
+
+/// Warns of settings for files of a kind that is not there.
+pub(crate) fn report_unused_of_files<'i>(
+    infos: impl IntoIterator<Item = &'i FileInfo>,
+    settings: &PreparationSettings,
+    progress: &dyn Progress,
+) {
+    let infos: Vec<&FileInfo> = infos.into_iter().collect();
+    let has_none = |kind: &str| !infos.iter().any(|info| info.format.starts_with(kind));
+    if settings.columns.is_some() && has_none("text") {
+        let line =
+            "warning: no effect, since no file is text: all other formats name their columns";
+        progress.choice(line, &["columns"]);
+    }
+    if settings.animation_name.is_some() && has_none("glTF") {
+        let line = "warning: no effect, since no file is glTF: only these have animations";
+        progress.choice(line, &["animation_name"]);
+    }
+}
+
+/// Warns of settings that the file of the picture or movie cannot hold.
+fn report_unused_of_output(description: &SceneDescription, progress: &dyn Progress) {
+    let Some(output) = &description.output.output else { return };
+    // Standard output is a PNG.
+    let extension =
+        output.extension().map_or("png".into(), |it| it.to_string_lossy().to_lowercase());
+    let extension = extension.as_str();
+    let has_depths = ["png", "tif", "tiff"].contains(&extension);
+    if description.picture.bit_depth == Some(BitDepth::Sixteen) && !has_depths {
+        let line = format!("warning: no effect on .{extension}: only .png and .tif have 16 bits");
+        progress.choice(&line, &["bit_depth"]);
+    }
+    let backdrop = match extension {
+        "jpg" | "jpeg" => Some("white"),
+        "png" | "tif" | "tiff" | "webp" | "exr" => None,
+        _ => Some("black"),
+    };
+    if let (Some(color), Background::Transparent) = (backdrop, description.picture.background()) {
+        let line = format!("warning: .{extension} has no transparency: the background is {color}");
+        progress.choice(&line, &["background"]);
+    }
+    let states_dpi = has_depths || ["jpg", "jpeg"].contains(&extension);
+    let plan = &description.plan;
+    if let (Some(dpi), false) = (plan.dpi, plan.is_to_scale()) {
+        let place = if states_dpi { "stated in the file alone" } else { "not stated in the file" };
+        let line =
+            format!("warning: {dpi} pixels per inch are {place}: without a scale no size follows");
+        progress.choice(&line, &["dpi", "scale"]);
+    }
+}
