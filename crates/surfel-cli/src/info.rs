@@ -1,7 +1,7 @@
 //! `surfel info`: what is in a file, as a table or as JSON.
 
 use crate::global::Global;
-use crate::inputs::expand;
+use crate::inputs::expand_content;
 use crate::options::{KeyOptions, Scope};
 use crate::report::{Report, print};
 use crate::stdin_copy::with_stdin_named;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use surfel::crs::short_name;
 use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::class_name;
-use surfel_core::math::Vec3;
+use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{
     COLOR_8_TO_16, PointCloud, STATION, ScanStation, Subsample, Values, have_8_bits, infer_up,
     is_flag, is_valid_position, points_per_area, spacing,
@@ -60,7 +60,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let options = description.objects_default.preparation.load_options(ColumnChoice::All)?;
     let limit = global.start()?.memory_limit;
     let mut all = Vec::new();
-    for file in &expand(&args.files, report)? {
+    for file in &expand_content(&args.files, report)? {
         let header = surfel_formats::inspect(file)?;
         let info = if args.summary {
             summarize(file, &header)
@@ -115,7 +115,8 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "points_without_position": cloud.len() - cloud.positions.iter().filter(|p| is_valid_position(**p)).count(),
         "triangles": source.n_triangles,
         "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
-        "global_shift": cloud.origin.to_array(),
+        // Adding 0 turns -0 into 0.
+        "global_shift": (cloud.origin + DVec3::ZERO).to_array(),
         "spacing": distance,
         "points_per_square_unit": points_per_area(&cloud.positions, DENSITY_CELL * distance),
         "resolution": source.resolution.map(|step| step.to_array()),
@@ -270,7 +271,8 @@ fn table(info: &Value) -> String {
         row("columns", text(if is_unknown { &Value::Null } else { &info["columns_in_file"] }));
         return lines.join("\n");
     }
-    row("up", text(&info["up"]["reason"]));
+    let up = text(&info["up"]["reason"]);
+    row("up", up.strip_prefix("up is ").unwrap_or(&up).to_owned());
     for (i, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
         let title = if i == 0 { "stations" } else { "" };
         let name = text(&station["name"]);

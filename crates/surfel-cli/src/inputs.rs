@@ -9,6 +9,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
+use surfel::description::is_scene_file;
 use surfel::description::pattern::{file_names, matching};
 use surfel_core::progress::Progress;
 
@@ -47,6 +48,22 @@ pub fn expand(words: &[PathBuf], report: &Report) -> anyhow::Result<Vec<PathBuf>
         }
     }
     Ok(files)
+}
+
+/// Returns the files that words of a command line stand for, none of which may be a scene file.
+///
+/// # Errors
+///
+/// Fails for scene files, and as [`expand`] does.
+pub fn expand_content(words: &[PathBuf], report: &Report) -> anyhow::Result<Vec<PathBuf>> {
+    let files = expand(words, report)?;
+    match files.iter().find(|file| is_scene_file(file)) {
+        None => Ok(files),
+        Some(file) => anyhow::bail!(
+            "{}: is a scene file, which surfel render, animate and view take; name the files in it",
+            file.display()
+        ),
+    }
 }
 
 fn is_stdin(word: &Path) -> bool {

@@ -2,7 +2,7 @@
 
 use crate::Usage;
 use crate::global::Global;
-use crate::inputs::expand;
+use crate::inputs::expand_content;
 use crate::options::{KeyOptions, Scope};
 use crate::output::check_cloud;
 use crate::report::Report;
@@ -66,7 +66,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let run = global.start()?;
     let description = SceneDescription { run, ..args.options.description.clone()? };
     check_cloud(&args.output)?;
-    let files = expand(&args.files, report)?;
+    let files = expand_content(&args.files, report)?;
     refuse_input_as_output(&files, &args.output)?;
     let options = PrepareOptions { normals: args.normals, keep_variation: args.keep_variation };
     let Loaded { cloud, info } = prepare_files(&files, &description, options, report)?;

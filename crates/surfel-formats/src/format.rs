@@ -208,7 +208,10 @@ const SPLAT_EXTENSIONS: [(&str, &str); 4] = [
 
 static ADVICE: LazyLock<String> = LazyLock::new(|| {
     let extensions = FORMATS.iter().flat_map(|format| format.extensions);
-    format!("surfel reads {}; convert the file to one of them", list_extensions(extensions, "and"))
+    let extensions = list_extensions(extensions, "and");
+    format!(
+        "surfel reads {extensions}, and scene files (.toml, .json); convert the file to one of them"
+    )
 });
 
 /// Returns extensions with their dots as a list in words, whose last two are joined by `conjunction`.

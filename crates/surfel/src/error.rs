@@ -1,6 +1,6 @@
 //! Errors between a description and a picture.
 
-use crate::description::Invalid;
+use crate::description::{Invalid, with_nearest};
 use std::path::PathBuf;
 
 /// An error of this crate. Its message names the file, the place in it, what was found and what was expected.
@@ -15,7 +15,7 @@ pub enum Error {
     Core(#[from] surfel_core::Error),
     /// A file could not be read or written.
     #[error(transparent)]
-    File(#[from] surfel_formats::Error),
+    File(surfel_formats::Error),
     /// The renderer refused what these files hold.
     // Not named `source`: programs that print the chain of sources would print it twice.
     #[error("{}: {cause}", crate::names::list_files(files))]
@@ -29,7 +29,7 @@ pub enum Error {
     #[error("{0}")]
     Unfit(String),
     /// A movie was not finished.
-    #[error("{cause}; {n_done} of {n_frames} frames are kept, continue from there with --resume")]
+    #[error("{cause}; {} kept, continue from there with --resume", frames(*n_done, *n_frames))]
     Unfinished {
         /// The reason.
         cause: Box<Error>,
@@ -58,5 +58,41 @@ impl Error {
     }
 }
 
+impl From<surfel_formats::Error> for Error {
+    fn from(error: surfel_formats::Error) -> Self {
+        match error {
+            surfel_formats::Error::Core(cause @ surfel_core::Error::UnknownName { .. }) => {
+                Self::Unfit(with_nearest(&cause))
+            }
+            other => Self::File(other),
+        }
+    }
+}
+
 /// A result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Returns how many frames of a movie are done, with the verb.
+fn frames(n_done: u32, n_frames: u32) -> String {
+    match n_done {
+        n if n == n_frames => "all frames are".to_owned(),
+        1 => format!("1 of {n_frames} frames is"),
+        n => format!("{n} of {n_frames} frames are"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Numbers of frames in words.
+
+    use super::*;
+
+    #[test]
+    fn frames_that_are_kept_are_counted_in_words() {
+        let texts = [(1, 3), (2, 3), (3, 3), (1, 1)].map(|(n_done, n)| frames(n_done, n));
+        assert_eq!(
+            texts,
+            ["1 of 3 frames is", "2 of 3 frames are", "all frames are", "all frames are"]
+        );
+    }
+}

@@ -135,6 +135,16 @@ fn invalid_values_name_the_option_and_what_was_expected() {
             &["--camera-position", "1,2"][..],
             "error: --camera-position: found \"1,2\", expected three numbers as in [1.5, -2, 0]",
         ),
+        (
+            &["--orient", "statoin"],
+            "error: --orient: found \"statoin\", expected auto, none, station, scan-angle, up, mst or \
+             viewpoint:x,y,z; the nearest known one is `station`",
+        ),
+        (
+            &["--class", "high vegetatoin"],
+            "error: --class: found \"high vegetatoin\", expected numbers or names of ASPRS classes, as in 2,6 or \
+             ground,building; the nearest known one is `high vegetation`",
+        ),
         (&["--spp", "0"], "error: --spp: found \"0\", expected a whole number from 1 to 65536"),
         (
             &["--camera-panorama", "--camera-view-angle", "60"],

@@ -79,6 +79,9 @@ fn errors_name_missing_paths_and_folders() {
         let text = fail(&["render", &cloud, "-o", "/proc/out.png"], 1);
         assert!(text.contains("/proc/out.png") && !text.contains("create it first"), "{text}");
     }
+    let like_a_folder = format!("{picture}/");
+    let text = fail(&["render", &cloud, "-o", &like_a_folder], 1);
+    assert!(text.contains("name a file, not a folder") && !text.contains("normals"), "{text}");
     assert!(fail(&["render", &cloud, "-o", &folder_path], 2).contains(&folder_path));
     assert!(fail(&["render", &cloud, "-o", &folder.path("out.gif")], 2).contains("gif"));
     assert!(fail(&["prepare", &cloud, "-o", &picture], 2).contains("out.png"));
@@ -104,6 +107,18 @@ fn the_error_for_a_missing_column_lists_those_of_the_file() {
             // The error comes before the work.
             assert!(!text.contains("normals of"), "{text}");
         }
+    }
+}
+
+#[test]
+fn a_filter_of_an_unknown_column_is_answered_with_the_nearest() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    for command in ["render", "prepare"] {
+        let output = folder.path(if command == "render" { "a.png" } else { "a.ply" });
+        let text = fail(&[command, &cloud, "-o", &output, "--filter", "clasification > 3"], 1);
+        let advice = "; the nearest known one is `classification`";
+        assert!(text.contains("unknown column of the filter") && text.contains(advice), "{text}");
     }
 }
 

@@ -109,7 +109,7 @@ fn files_are_hidden_and_coloured_apart() {
     for (setting, expected) in [
         ("none.ply:visible%3Dfalse", "no file or object"),
         ("dome.ply:vertices%3Dtrue", "cannot change vertices"),
-        ("dome.ply:size%3D3", "expected a file or object"),
+        ("dome.ply:size%3D3", "unknown key `size`"),
         ("dome.ply:color%3Dwind", "wind"),
     ] {
         let error = server.error(&format!("/render?object-settings={setting}"));

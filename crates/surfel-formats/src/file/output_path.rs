@@ -9,10 +9,11 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 ///
-/// Fails if the folder of `path` does not exist, or if `path` is a folder itself.
+/// Fails if the folder of `path` does not exist, or if `path` is a folder itself or ends as the name of one.
 pub fn check_output_path(path: &Path) -> Result<()> {
     let folder = parent_folder(path);
-    let problem = if path.is_dir() {
+    let ends_as_folder = path.to_string_lossy().ends_with(std::path::is_separator);
+    let problem = if path.is_dir() || ends_as_folder {
         std::io::ErrorKind::IsADirectory
     } else if !folder.exists() {
         std::io::ErrorKind::NotFound

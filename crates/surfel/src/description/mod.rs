@@ -40,7 +40,7 @@ pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
 pub use named_view::{NamedView, ViewSettings};
-pub use nearest::{nearest, nearest_if_any, synonym};
+pub use nearest::{misspelled, nearest, nearest_if_any, synonym, with_nearest};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
@@ -362,6 +362,19 @@ impl SceneDescription {
             return Err(Invalid::at("object", "no objects; add an [[object]] with a file"));
         }
         Ok(())
+    }
+
+    /// Returns the error of a name that no file and no object has.
+    pub(crate) fn unknown_target(&self, target: &str) -> Invalid {
+        let names = self.objects.iter().flat_map(ObjectDescription::names);
+        let names = self.files.iter().cloned().chain(names);
+        let mut known: Vec<String> = names.map(|name| name.display().to_string()).collect();
+        known.dedup();
+        let advice = match nearest_if_any(target, known.iter().map(String::as_str)) {
+            none if none.is_empty() => format!("; there is {}", known.join(", ")),
+            advice => advice,
+        };
+        Invalid::new(format!("no file or object `{target}`{advice}"))
     }
 
     /// Fails where a parent or an animation names nothing, or several things.

@@ -22,8 +22,25 @@ pub fn nearest_if_any<'k>(found: &str, known: impl IntoIterator<Item = &'k str>)
         .map_or_else(String::new, |name| format!("; the nearest known one is `{name}`"))
 }
 
+/// Returns the known name that a text misspells: all but at most a third of its letters are the same.
+pub fn misspelled<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
+    let n_wrong = |name: &&str| strsim::osa_distance(&found.to_lowercase(), name);
+    let best = known.into_iter().min_by_key(n_wrong);
+    best.filter(|name| n_wrong(name) <= found.chars().count() / 3)
+}
+
+/// Returns the message of an error of the library; an unknown name is answered with the nearest known one.
+pub fn with_nearest(error: &surfel_core::Error) -> String {
+    match error {
+        surfel_core::Error::UnknownName { found, known, .. } => {
+            format!("{error}{}", nearest_if_any(found, known.split(", ")))
+        }
+        _ => error.to_string(),
+    }
+}
+
 /// Words of other programs, with the keys that mean the same here.
-const SYNONYMS: [(&str, &str); 14] = [
+const SYNONYMS: [(&str, &str); 15] = [
     ("fov", "camera.view_angle"),
     ("eye", "camera.position"),
     ("zoom", "camera.zoom_factor"),
@@ -33,6 +50,7 @@ const SYNONYMS: [(&str, &str); 14] = [
     ("window_size", "resolution"),
     ("samples", "spp"),
     ("scalars", "color"),
+    ("colour", "color"),
     ("scalar_field", "color"),
     ("colormap", "cmap"),
     ("clim", "range"),

@@ -3,6 +3,7 @@
 use super::keys::{KeyedSettings, settings};
 use super::material::is_named;
 use super::rule::Rule;
+use super::table::key_advice;
 use super::{
     Invalid, ObjectDescription, ObjectSettings, SceneDescription, value_text, write_table,
 };
@@ -115,9 +116,8 @@ fn parse(text: &str) -> Result<ObjectOverride, Invalid> {
         let key = key.trim().replace('-', "_");
         keys.contains(&key.as_str()).then(|| (&text[..at], key, value.trim()))
     });
-    let (target, key, value) = found
-        .filter(|(target, ..)| !target.is_empty())
-        .ok_or_else(|| Invalid::new(format!("{EXPECTED}; the keys are {}", keys.join(", "))))?;
+    let (target, key, value) =
+        found.filter(|(target, ..)| !target.is_empty()).ok_or_else(|| unreadable(text, &keys))?;
     let mut object = ObjectDescription::default();
     let read = ObjectOverride { target: target.into(), key, value: json!(value) };
     read.apply(&mut object).map_err(|error| error.within(&read.key))?;
@@ -127,6 +127,17 @@ fn parse(text: &str) -> Result<ObjectOverride, Invalid> {
         key => object.settings.parts().iter().find_map(|part| part.settings.get(key)),
     };
     Ok(ObjectOverride { value: value.unwrap_or(read.value), ..read })
+}
+
+/// Returns the error of a text that has no known key: that of the word in the place of the key, if there is one.
+fn unreadable(text: &str, keys: &[&str]) -> Invalid {
+    let word = text.split_once('=').and_then(|(start, _)| start.rsplit_once(':'));
+    match word {
+        Some((target, key)) if !target.is_empty() && !key.is_empty() => {
+            Invalid::new(format!("unknown key `{key}`{}", key_advice(key.trim(), keys)))
+        }
+        _ => Invalid::new(format!("{EXPECTED}; the keys are {}", keys.join(", "))),
+    }
 }
 
 impl OverrideSettings {
@@ -161,8 +172,7 @@ impl SceneDescription {
             });
             meant.try_for_each(|object| one.apply(object)).map_err(within)?;
             if !is_known {
-                let message = format!("no file or object `{}`", one.target);
-                return Err(within(Invalid::new(message)));
+                return Err(within(self.unknown_target(&one.target)));
             }
         }
         Ok(())
@@ -205,6 +215,8 @@ mod tests {
         {
             assert!(ObjectOverrides.read(&json!(text), Path::new("")).is_err(), "{text}");
         }
+        let error = ObjectOverrides.read(&json!("a.ply:colour=class"), Path::new("")).unwrap_err();
+        assert_eq!(error.message, "unknown key `colour`; here it is `color`");
     }
 
     #[test]

@@ -12,10 +12,15 @@ pub(super) struct CrsRule;
 
 impl Rule<String> for CrsRule {
     fn read(&self, value: &Value, folder: &Path) -> Result<String, Invalid> {
-        let text = Text.read(value, folder)?;
+        let mut text = Text.read(value, folder)?;
+        if text.trim().parse::<u32>().is_ok() {
+            text = format!("EPSG:{}", text.trim());
+        }
         match CoordinateSystem::parse(&text) {
             Some(_) => Ok(text),
-            None => Err(expected("an EPSG code as in EPSG:25832, or WKT of a system on Earth")),
+            None => Err(expected(
+                "the EPSG code of a known system on Earth as in EPSG:25832 or 25832, or its WKT",
+            )),
         }
     }
 
@@ -96,6 +101,15 @@ mod tests {
         {
             assert_eq!(read(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_coordinate_system_is_named_by_its_code_with_or_without_epsg() {
+        let read = |text: &str| CrsRule.read(&json!(text), Path::new(""));
+        assert_eq!(read("25832"), read("EPSG:25832"));
+        assert_eq!(read("25832").unwrap(), "EPSG:25832");
+        let error = read("EPSG:99999").unwrap_err();
+        assert!(error.message.contains("the EPSG code of a known system"), "{error}");
     }
 
     #[test]

@@ -67,12 +67,25 @@ pub(super) fn take_normalized(table: &Map<String, Value>) -> Map<String, Value> 
 
 pub(super) fn unknown_key(key: &str, known: impl IntoIterator<Item = impl AsRef<str>>) -> Invalid {
     let known: Vec<String> = known.into_iter().map(|name| name.as_ref().to_owned()).collect();
-    let synonym = synonym(key).filter(|path| known.iter().any(|known| known == path));
-    let advice = match synonym {
-        Some(path) => format!("; here it is `{path}`"),
-        None => nearest(&key.replace('-', "_"), known.iter().map(String::as_str)),
+    Invalid::at(key, format!("unknown key{}", key_advice(key, &known)))
+}
+
+/// Advises on an unknown key: by the known ones that mean the same or have its name in another table, or by the nearest.
+pub(super) fn key_advice(key: &str, known: &[impl AsRef<str>]) -> String {
+    let known = known.iter().map(AsRef::as_ref);
+    let key = key.replace('-', "_");
+    let last = |path: &str| path.rsplit('.').next().map(str::to_owned);
+    let synonym = synonym(&key).filter(|path| known.clone().any(|known| known == *path));
+    let paths: Vec<&str> = match synonym {
+        Some(path) => vec![path],
+        None => known.clone().filter(|path| last(path) == last(&key)).collect(),
     };
-    Invalid::at(key, format!("unknown key{advice}"))
+    let Some(first) = paths.first() else { return nearest(&key, known) };
+    let outside = match key.split_once('.') {
+        Some((table, _)) if !first.contains('.') => format!(", outside of [{table}]"),
+        _ => String::new(),
+    };
+    format!("; here it is `{}`{outside}", paths.join("` or `"))
 }
 
 /// Takes the tables of `[[name]]` out of a table.

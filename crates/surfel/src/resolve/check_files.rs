@@ -59,9 +59,7 @@ fn check_materials(description: &SceneDescription) -> Result<(), Invalid> {
     for choice in description.materials.choices() {
         let Some(target) = &choice.target else { continue };
         if !known.iter().any(|file| choice.names(file)) {
-            let known: Vec<String> = known.iter().map(|file| file.display().to_string()).collect();
-            let message = format!("no file or object `{target}`; there is {}", known.join(", "));
-            return Err(Invalid::at("material", message));
+            return Err(description.unknown_target(target).within("material"));
         }
     }
     Ok(())
