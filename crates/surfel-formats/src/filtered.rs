@@ -24,9 +24,10 @@ pub(crate) fn read_filtered(
     let n_kept = cloud.len() as u64;
     let n_points = info.n_points.replace(n_kept).unwrap_or(n_kept);
     progress.note(&format!(
-        "{}: {n_kept} of {} meet {filter}",
+        "{}: {n_kept} of {} meet {}",
         input.name,
-        counted(n_points, "point")
+        counted(n_points, "point"),
+        filter.describe()
     ));
     options.columns.drop_others(&mut cloud);
     Ok(Loaded { cloud, info })

@@ -97,7 +97,10 @@ impl<'a> Json<'a> {
         let index = reference.index()?;
         let items = self.value.get(key).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let Some(value) = items.get(index) else {
-            let expected = format!("one of the {} `{key}`, counted from 0", items.len());
+            let expected = match items.len() {
+                1 => format!("0, since `{key}` has one object"),
+                n => format!("one of the {n} `{key}`, counted from 0"),
+            };
             return Err(reference.error(format!("index {index}"), expected));
         };
         let item = self.child(key, value).child(&index.to_string(), value);

@@ -64,7 +64,7 @@ pub(crate) fn read(
     salvage.report("point", n_points, Some(header.n_points), progress)?;
     if !cloud.is_empty() {
         color_bits.report(input, &mut cloud, progress);
-        drop_zero_columns(input, &mut cloud, progress);
+        drop_zero_columns(input, &mut cloud, &options.columns, progress);
     }
     let info = FileInfo { n_points: Some(n_points), ..file_info(input, &header) };
     Ok(Loaded { cloud, info })
@@ -236,8 +236,14 @@ fn selection(choice: &ColumnChoice) -> DecompressionSelection {
 }
 
 /// Drops intensities, classes and flags that are all zero: every point format has fields for them, so zeros mean that
-/// they were never set.
-fn drop_zero_columns(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
+/// they were never set. Classes are needed to leave out noise, so that their absence is reported only where all columns
+/// are read.
+fn drop_zero_columns(
+    input: &Input,
+    cloud: &mut PointCloud,
+    columns: &ColumnChoice,
+    progress: &dyn Progress,
+) {
     let note = |what: &str| {
         progress.note(&format!("{}: all {what} are zero; treated as absent", input.name));
     };
@@ -246,7 +252,9 @@ fn drop_zero_columns(input: &Input, cloud: &mut PointCloud, progress: &dyn Progr
         cloud.intensity = None;
     }
     if cloud.classification.as_ref().is_some_and(|column| column.par_iter().all(|v| *v == 0)) {
-        note("classes");
+        if *columns == ColumnChoice::All {
+            note("classes");
+        }
         cloud.classification = None;
     }
     let is_set = |values: &Values| (0..values.len()).into_par_iter().any(|i| values.get(i) != 0.0);

@@ -32,7 +32,7 @@ pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Pr
         }
         if info.coordinate_system != infos[0].coordinate_system {
             progress.note(&format!(
-                "{}: its coordinate system differs from that of {}, or only one of them names it",
+                "warning: {}: its coordinate system differs from that of {}, or only one of them names it",
                 path.display(),
                 paths[0].display()
             ));

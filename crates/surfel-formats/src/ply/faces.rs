@@ -256,7 +256,10 @@ impl<'a> FaceElement<'a> {
                 corner.fract() == 0.0 && 0.0 <= corner && corner < self.n_vertices as f64;
             is_vertex.then_some(corner as u32).ok_or_else(|| LineError {
                 found: format!("vertex {corner}"),
-                expected: format!("one of the {} vertices, counted from 0", self.n_vertices),
+                expected: match self.n_vertices {
+                    1 => "0, since there is one vertex".into(),
+                    n => format!("one of the {n} vertices, counted from 0"),
+                },
             })
         };
         if self.is_strips {

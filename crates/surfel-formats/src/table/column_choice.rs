@@ -105,6 +105,30 @@ impl ColumnChoice {
 }
 
 impl TextColumn {
+    /// Names of the columns that have a meaning.
+    pub const NAMES: [&str; 12] = [
+        "x",
+        "y",
+        "z",
+        "nx",
+        "ny",
+        "nz",
+        "red",
+        "green",
+        "blue",
+        "radius",
+        "intensity",
+        "classification",
+    ];
+
+    /// Returns the name of a column that has no other meaning.
+    pub fn scalar(&self) -> Option<&str> {
+        match &self.0 {
+            Some(ColumnRole::Scalar(name)) => Some(name),
+            _ => None,
+        }
+    }
+
     /// Returns the column of this name; `-` and `skip` name one that is not read.
     pub fn parse(name: &str) -> Self {
         match name.trim() {

@@ -21,6 +21,8 @@ pub(crate) enum ColumnRole {
 
 /// Names of longitudes, in degrees.
 const LONGITUDES: [&str; 4] = ["longitude", "lon", "lng", "long"];
+/// Names of the axes in lists of survey points.
+const SURVEY_AXES: [&str; 3] = ["e", "n", "h"];
 /// Names of latitudes, in degrees.
 const LATITUDES: [&str; 2] = ["latitude", "lat"];
 
@@ -63,7 +65,7 @@ impl ColumnRole {
     /// scalars.
     ///
     /// The role's own name, such as `z`, takes precedence over synonyms, such as `height`, and an earlier synonym over
-    /// a later one.
+    /// a later one. E, N and H are axes if no other column is the axis.
     pub fn from_names(names: &[&str]) -> Vec<Self> {
         let scalar = |name: &str| Self::Scalar(name.into());
         let candidates: Vec<Self> = names
@@ -79,7 +81,14 @@ impl ColumnRole {
         let assigned = columns.map(|(i, (role, name))| {
             if column_with_role(role) == Some(i) { role.clone() } else { scalar(name) }
         });
-        assigned.collect()
+        let mut roles: Vec<Self> = assigned.collect();
+        for (axis, name) in SURVEY_AXES.iter().enumerate() {
+            let column = names.iter().position(|column| column.trim().eq_ignore_ascii_case(name));
+            if let Some(column) = column.filter(|_| !roles.contains(&Self::Position(axis))) {
+                roles[column] = Self::Position(axis);
+            }
+        }
+        roles
     }
 
     /// Returns the name that users see.

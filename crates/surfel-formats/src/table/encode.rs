@@ -42,9 +42,10 @@ pub(crate) fn encode_points(
     Ok(())
 }
 
-/// Notes that a format of 8 bits rounds colours of 16.
+/// Notes that a format of 8 bits rounds colours of 16. Trained splats keep theirs in columns of their own.
 pub(crate) fn note_rounded_colors(path: &Path, cloud: &PointCloud, progress: &dyn Progress) {
-    if cloud.colors.as_deref().is_some_and(|colors| !have_8_bits(colors)) {
+    let is_rounded = cloud.colors.as_deref().is_some_and(|colors| !have_8_bits(colors));
+    if is_rounded && !cloud.has_gaussians() {
         progress.note(&format!("{}: colours of 16 bits are rounded to 8", path.display()));
     }
 }

@@ -2,9 +2,6 @@
 
 use crate::table::ColumnRole;
 
-/// Names of the axes in lists of survey points.
-const SURVEY_AXES: [&str; 3] = ["e", "n", "h"];
-
 /// Returns the fields as names of columns, if x, y and z are among them.
 pub(super) fn column_names(fields: &[&[u8]]) -> Option<Vec<String>> {
     let mut names: Vec<String> = fields
@@ -18,15 +15,8 @@ pub(super) fn column_names(fields: &[&[u8]]) -> Option<Vec<String>> {
     (0..3).all(|axis| roles.contains(&ColumnRole::Position(axis))).then_some(names)
 }
 
-/// Returns the roles of named columns. E, N and H are axes if no other column is the axis.
+/// Returns the roles of named columns.
 pub(super) fn roles_of_names(names: &[String]) -> Vec<ColumnRole> {
     let words: Vec<&str> = names.iter().map(String::as_str).collect();
-    let mut roles = ColumnRole::from_names(&words);
-    for (axis, name) in SURVEY_AXES.iter().enumerate() {
-        let column = names.iter().position(|column| column.eq_ignore_ascii_case(name));
-        if let Some(column) = column.filter(|_| !roles.contains(&ColumnRole::Position(axis))) {
-            roles[column] = ColumnRole::Position(axis);
-        }
-    }
-    roles
+    ColumnRole::from_names(&words)
 }

@@ -188,7 +188,7 @@ fn check_columns(input: &Input, columns: &[Option<ColumnRole>], preamble: &Pream
         if !columns.contains(&Some(ColumnRole::Position(axis))) {
             let found =
                 format!("{} without {}", counted(columns.len(), "column"), ["x", "y", "z"][axis]);
-            let advice = "state the columns with --columns, as in x,y,z,-,r,g,b";
+            let advice = "state the columns with --columns, as in x,y,z,-,r,g,b or -,n,e,h";
             return Err(input.malformed(location, found, "columns x, y and z", advice));
         }
     }

@@ -82,7 +82,7 @@ impl CleanReport {
             (self.n_invalid_positions, "point", "dropped: no position, or beyond 1e15"),
             (self.n_noise, "point", "dropped: classes of noise (7, 18)"),
             (self.n_withheld, "point", "dropped: flagged withheld"),
-            (self.n_duplicates, "point", "dropped: exact duplicates"),
+            (self.n_duplicates, "point", "dropped: at exactly the position of another"),
             (self.n_invalid_normals, "normal", "treated as missing: zero or not finite"),
             (self.n_scaled_normals, "normal", "scaled to unit length"),
             (self.n_invalid_radii, "radius value", "treated as missing: not positive and finite"),
@@ -131,7 +131,10 @@ fn find_dropped(
             Duplicates::Drop => dropped.extend(found),
             Duplicates::Keep if found.is_empty() => {}
             Duplicates::Keep => {
-                let line = format!("{} kept: exact duplicates", counted(found.len(), "point"));
+                let line = format!(
+                    "{} kept at exactly the position of another",
+                    counted(found.len(), "point")
+                );
                 progress.choice(&line, &["duplicates"]);
             }
         }

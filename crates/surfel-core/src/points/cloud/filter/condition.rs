@@ -57,18 +57,23 @@ impl Condition {
 
     /// Appends the names of all columns.
     pub fn collect_columns<'a>(&'a self, columns: &mut Vec<&'a str>) {
+        self.visit_comparisons(&mut |left, right| {
+            columns.extend([left, right].into_iter().filter_map(|operand| match operand {
+                Operand::Column(name) => Some(name.as_str()),
+                Operand::Number(_) => None,
+            }));
+        });
+    }
+
+    /// Calls `visit` with the operands of each comparison.
+    pub fn visit_comparisons<'a>(&'a self, visit: &mut dyn FnMut(&'a Operand, &'a Operand)) {
         match self {
             Self::All(parts) | Self::Any(parts) => {
-                parts.iter().for_each(|part| part.collect_columns(columns));
+                parts.iter().for_each(|part| part.visit_comparisons(visit));
             }
-            Self::Not(inner) => inner.collect_columns(columns),
+            Self::Not(inner) => inner.visit_comparisons(visit),
             Self::Within(_) => {}
-            Self::Compare(left, _, right) => {
-                columns.extend([left, right].into_iter().filter_map(|operand| match operand {
-                    Operand::Column(name) => Some(name.as_str()),
-                    Operand::Number(_) => None,
-                }));
-            }
+            Self::Compare(left, _, right) => visit(left, right),
         }
     }
 

@@ -126,10 +126,27 @@ impl<'a> Evaluation<'a> {
         };
         let column = self.columns.iter().find(|(known, _)| known == name).map(|(_, column)| column);
         let column = column.expect("columns were found before");
-        let has_16_bits = matches!(other, Operand::Number(number) if MAX_8_BITS < *number);
+        let has_16_bits = has_16_bits(other);
         let color_unit = if has_16_bits { 1 } else { COLOR_8_TO_16 };
         column.values(self.cloud, color_unit, start..start + n)
     }
+}
+
+/// Returns true if a channel of a colour that is compared with `other` has 16 bits.
+fn has_16_bits(other: &Operand) -> bool {
+    matches!(other, Operand::Number(number) if MAX_8_BITS < *number)
+}
+
+/// Returns the greatest channel of a colour that is compared with a number; `None` for all other operands.
+pub(super) fn color_range(operand: &Operand, other: &Operand) -> Option<u16> {
+    let Operand::Column(name) = operand else { return None };
+    let wanted = plain(name);
+    let is_color = NAMES.iter().any(|(names, column)| {
+        matches!(column, ColumnValues::Color(_)) && names.contains(&wanted.as_str())
+    });
+    let is_number = matches!(other, Operand::Number(_));
+    let max = if has_16_bits(other) { u16::MAX } else { MAX_8_BITS as u16 };
+    (is_color && is_number).then_some(max)
 }
 
 impl ColumnValues<'_> {

@@ -6,8 +6,8 @@ mod evaluate;
 mod polygon;
 
 use condition::{Condition, Operand, Relation};
-use evaluate::Evaluation;
 pub use evaluate::visit_column;
+use evaluate::{Evaluation, color_range};
 pub(crate) use polygon::Polygon;
 use std::fmt;
 use std::str::FromStr;
@@ -84,6 +84,18 @@ impl PointFilter {
         columns
     }
 
+    /// Returns the condition in words, with the range of the colours that it compares with numbers.
+    pub fn describe(&self) -> String {
+        let mut range = None;
+        self.condition.visit_comparisons(&mut |left, right| {
+            range = range.max(color_range(left, right)).max(color_range(right, left));
+        });
+        match range {
+            Some(max) => format!("{self}, with colours from 0 to {max}"),
+            None => self.to_string(),
+        }
+    }
+
     /// Returns true for each point of `cloud` from `start` on that the filter keeps.
     ///
     /// # Errors
@@ -158,6 +170,14 @@ mod tests {
         assert_eq!(kept("blue > 255"), []);
         assert_eq!(kept("blue > 65534 && green < blue"), [0, 1, 2, 3]);
         assert_eq!(kept("x > -1e0 and not y < .5 or intensity == 10"), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn the_range_of_colours_is_told() {
+        let told = |filter: &str| filter.parse::<PointFilter>().unwrap().describe();
+        assert_eq!(told("red > 200"), "red > 200, with colours from 0 to 255");
+        assert_eq!(told("z > 900 && 300 < G"), "z > 900 && 300 < G, with colours from 0 to 65535");
+        assert_eq!(told("red < blue || z > 300"), "red < blue || z > 300");
     }
 
     #[test]
