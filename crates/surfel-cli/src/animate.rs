@@ -10,7 +10,9 @@ use crate::usage::Usage;
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 use surfel::animate::{PlannedMovie, movie_options};
+use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
+use surfel_core::words::counted;
 use surfel_formats::MovieOptions;
 
 /// Arguments of `surfel animate`.
@@ -82,7 +84,17 @@ pub fn animate_description(
         return Ok(print(&format!("{:#}", with_info(&movie.complete, &movie.loaded)))?);
     };
     report_threads(Simd::detect(), report);
-    Ok(movie.render(output, resumes, report)?)
+    let line = movie_line(output, &movie.complete);
+    movie.render(output, resumes, report)?;
+    report.note(&line);
+    Ok(())
+}
+
+/// Returns a line about a finished movie: its name, length and size.
+fn movie_line(output: &Path, complete: &SceneDescription) -> String {
+    let (width, height) = complete.picture.resolution();
+    let frames = counted(complete.output.frames.unwrap_or(1), "frame");
+    format!("{}: {frames} of {width}x{height} pixels", output.display())
 }
 
 /// Renders the movie of a description on the workers of the scheduler at `address`.
@@ -98,9 +110,11 @@ fn animate_on_cluster(
     // The workers render frames of a movie whose length the data of this machine decide.
     recipe.output.frames = movie.complete.output.frames;
     recipe.output.output = None;
-    Ok(movie.collect(output, resumes, report, |frames, format, add| {
+    movie.collect(output, resumes, report, |frames, format, add| {
         cluster::render_frames(address, &recipe, (frames, format), add, report)
-    })?)
+    })?;
+    report.note(&movie_line(output, &movie.complete));
+    Ok(())
 }
 
 fn plan(description: &SceneDescription, report: &Report) -> anyhow::Result<PlannedMovie> {

@@ -1,7 +1,7 @@
 //! Movies: their frames, and the animations in them.
 
 use super::common::{
-    Folder, SMALL, command, dome, fail, gltf, read_png, square, stderr, succeed, tile,
+    Folder, SMALL, command, dome, fail, gltf, read_png, square, stderr, succeed, surfel, tile,
 };
 use std::fs;
 use std::process::Command;
@@ -69,6 +69,16 @@ fn a_turntable_writes_every_kind_of_movie() {
     }
     make("f#.exr");
     assert!(folder.names().contains(&"f8.exr".to_owned()));
+}
+
+#[test]
+fn a_finished_movie_is_named_with_its_length_and_size() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let output = folder.path("still.gif");
+    let arguments = ["animate", &cloud, "-o", &output, "--frames", "1", "--resolution", "32x24"];
+    let text = stderr(&surfel(&arguments));
+    assert!(text.ends_with(&format!("{output}: 1 frame of 32x24 pixels\n")), "{text}");
 }
 
 #[test]

@@ -230,12 +230,18 @@ fn prepare_keeps_duplicates_unless_asked() {
     for options in [&[][..], &["--duplicates", "keep"]] {
         let (n, message) = n_points(options);
         assert_eq!(n, 800);
-        assert!(message.contains("400 points kept: exact duplicates"), "{message}");
+        assert!(
+            message.contains("400 points kept at exactly the position of another"),
+            "{message}"
+        );
         assert!(message.contains("[--duplicates]"), "{message}");
     }
     let (n, message) = n_points(&["--duplicates", "drop"]);
     assert_eq!(n, 400);
-    assert!(message.contains("400 points dropped: exact duplicates"), "{message}");
+    assert!(
+        message.contains("400 points dropped: at exactly the position of another"),
+        "{message}"
+    );
     // Nothing else was asked for, so there are no normals and radii.
     let text = fs::read_to_string(&prepared).unwrap();
     assert!(text.starts_with("//X Y Z R G B\n0 0 0 9 9 9\n"), "{text}");
@@ -329,6 +335,23 @@ fn points_are_chosen_by_an_area() {
     let broken =
         folder.write("broken.geojson", r#"{"type":"Polygon","coordinates":[[[0,0],[1]]]}"#);
     assert!(refused(&broken, 2).contains("broken.geojson"));
+}
+
+#[test]
+fn the_range_of_filtered_colours_is_told() {
+    let folder = Folder::new();
+    let cloud = folder.write("grey.xyz", square(10, 200));
+    let output = folder.path("kept.ply");
+    let filtered =
+        |filter: &str| stderr(&surfel(&["prepare", &cloud, "-o", &output, "--filter", filter]));
+    let text = filtered("red > 300");
+    assert!(
+        text.contains("100 of 100 points meet red > 300, with colours from 0 to 65535"),
+        "{text}"
+    );
+    let text = filtered("red > 100");
+    assert!(text.contains("meet red > 100, with colours from 0 to 255"), "{text}");
+    assert!(filtered("z < 300").contains("meet z < 300\n"));
 }
 
 #[test]

@@ -122,6 +122,37 @@ fn the_first_column_of_a_text_may_be_skipped() {
 }
 
 #[test]
+fn columns_of_a_survey_are_understood() {
+    let folder = Folder::new();
+    let lines: String = (0..100).map(|i| format!("{i} {} {} 7 post\n", i / 10, i % 10)).collect();
+    let cloud = folder.write("survey.txt", lines);
+    for columns in ["p,n,e,z,d", "-,N,E,H,-"] {
+        let info = succeed(&["info", "--json", "--columns", columns, &cloud]);
+        let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+        assert_eq!(info["bounds"]["max"], serde_json::json!([9.0, 9.0, 7.0]), "{columns}");
+    }
+    let text = fail(&["info", "--columns", "p,a,b,c,d", &cloud], 1);
+    assert!(text.contains("as in x,y,z,-,r,g,b or -,n,e,h"), "{text}");
+}
+
+#[test]
+fn misspelled_columns_of_text_are_told_with_the_nearest() {
+    let folder = Folder::new();
+    let lines: String = (0..100).map(|i| format!("{} {} 1 9 9 9\n", i % 10, i / 10)).collect();
+    let cloud = folder.write("square.xyz", lines);
+    let output = folder.path("square.ply");
+    let told = |columns: &str| {
+        let arguments = ["prepare", &cloud, "-o", &output, "--columns", columns];
+        stderr(&surfel(&[&arguments[..], &["--subsample", "first:9"]].concat()))
+    };
+    let text = told("x,y,z,r,g,blu");
+    let warning =
+        "warning: column `blu` has no meaning; the nearest known one is `blue` [--columns]";
+    assert!(text.contains(warning), "{text}");
+    assert!(!told("x,y,z,rain,time,range").contains("warning"));
+}
+
+#[test]
 fn a_file_without_colours_is_named_with_the_option_that_keeps_it_apart() {
     let folder = Folder::new();
     let lines = |color: &str| -> String {

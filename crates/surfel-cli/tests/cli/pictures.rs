@@ -1,6 +1,6 @@
 //! Pixels, layers and bytes of pictures.
 
-use super::common::{Folder, dome, read_png, shot, square, stderr, succeed, surfel};
+use super::common::{Folder, SMALL, dome, read_png, shot, square, stderr, succeed, surfel};
 use std::fs;
 
 #[test]
@@ -77,6 +77,11 @@ fn radius_scale_applies_to_fixed_and_estimated_radii() {
     assert_eq!(picture(&["--radius", "0.125", "--radius-scale", "2"]), fixed);
     assert_eq!(picture(&["--radius-scale", "1"]), picture(&[]));
     assert_ne!(picture(&["--radius-scale", "2"]), picture(&[]));
+    let output = folder.path("dome.png");
+    let arguments = ["render", &cloud, "-o", &output, "--radius-scale", "2"];
+    let text = stderr(&surfel(&[&arguments[..], &SMALL].concat()));
+    let radii = text.lines().find(|line| line.starts_with("radii")).unwrap_or_default();
+    assert!(radii.ends_with("; all multiplied by 2 [--radius, --radius-scale]"), "{text}");
 }
 
 #[test]
@@ -184,6 +189,11 @@ fn one_point_and_a_line_are_in_the_picture() {
         let picture = folder.path(&format!("{name}.png"));
         let output = surfel(&["render", &cloud, "-o", &picture, "--resolution", "64x36"]);
         assert_eq!(read_png(&picture).0, 64, "{name}");
-        assert!(!stderr(&output).contains("of the picture is covered"), "{}", stderr(&output));
+        let text = stderr(&output);
+        assert!(!text.contains("of the picture is covered"), "{text}");
+        let has_one = name != "line.xyz";
+        for of_neighbours in ["neighbour [", "from planes through", "darken the sky"] {
+            assert_eq!(text.contains(of_neighbours), !has_one, "{of_neighbours}: {text}");
+        }
     }
 }

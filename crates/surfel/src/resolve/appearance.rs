@@ -13,6 +13,7 @@ use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, PreparedCloud};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Clip, Geometry, Graph};
+use surfel_core::surface::SurfaceKind;
 
 /// Colours prepared clouds, hides what is clipped, and gives everything its material. `raw` is the scene's graph, whose
 /// points are not used; `clouds` are in its order.
@@ -39,7 +40,11 @@ pub fn finish_graph(
     }
     let mut sequences = scene.sequences_under(description);
     clip(scene, &mut graph, &mut sequences, description)?;
-    assign_materials(scene, &mut graph, &mut sequences, description);
+    let shows_color_alone = assign_materials(scene, &mut graph, &mut sequences, description);
+    if shows_color_alone {
+        let line = "warning: the surface points shows nothing of a material but its colour";
+        progress.choice(line, &["surface", "material"]);
+    }
     Ok((graph, sequences))
 }
 
@@ -68,12 +73,19 @@ fn clip(
     Ok(())
 }
 
+/// Returns true if points that are drawn as pixels got a material of which they show the colour alone.
 fn assign_materials(
     scene: &LoadedScene,
     graph: &mut Graph,
     sequences: &mut [Sequence],
     description: &SceneDescription,
-) {
+) -> bool {
+    let mut shows_color_alone = false;
+    let is_raster: Vec<bool> = graph
+        .geometries
+        .iter()
+        .map(|it| matches!(it, Geometry::Points(cloud) if cloud.surface == SurfaceKind::Points))
+        .collect();
     let of_files = scene.files.iter().map(|(file, nodes)| {
         (nodes, material_of_file(description, file).map(|choice| &choice.material))
     });
@@ -84,8 +96,11 @@ fn assign_materials(
         let Some(material) = material else { continue };
         let material_idx = graph.materials.len();
         graph.materials.push(material.material());
-        for node in &mut graph.nodes[nodes.clone()] {
-            node.primitives.iter_mut().for_each(|primitive| primitive.material = material_idx);
+        let is_plain = ["matte", "unlit"].contains(&material.kind().as_str());
+        for primitive in graph.nodes[nodes.clone()].iter_mut().flat_map(|node| &mut node.primitives)
+        {
+            primitive.material = material_idx;
+            shows_color_alone |= !is_plain && is_raster[primitive.geometry];
         }
     }
     let has_lamps = graph.nodes.iter().any(|node| node.light.is_some());
@@ -96,6 +111,7 @@ fn assign_materials(
         unlit_without_lights(&mut graph.materials);
     }
     sequences.iter_mut().for_each(|sequence| sequence.bind_nodes(graph, is_dark));
+    shows_color_alone
 }
 
 /// Returns the material for a file: its own before that for everything, the last one given.

@@ -1,7 +1,7 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
 use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
-use crate::description::{Invalid, ObjectSettings, PreparationSettings};
+use crate::description::{Invalid, ObjectSettings, PreparationSettings, with_nearest};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
 use crate::names::list_files;
@@ -167,7 +167,8 @@ pub fn filtered_copy(
         let n_points = kept.len();
         let matches = matches(cloud, key, &filter)?;
         kept.retain(|i| matches[*i as usize]);
-        progress.note(&format!("{} of {} meet {filter}", kept.len(), counted(n_points, "point")));
+        let points = counted(n_points, "point");
+        progress.note(&format!("{} of {points} meet {}", kept.len(), filter.describe()));
         check_any_left(kept.len(), n_points, key, &filter)?;
     }
     Ok(cloud.subset(&kept))
@@ -189,7 +190,7 @@ fn check_any_left(
 }
 
 fn matches(cloud: &PointCloud, key: &str, filter: &PointFilter) -> Result<Vec<bool>, Invalid> {
-    filter.matches(cloud, 0).map_err(|error| Invalid::at(key, error.to_string()))
+    filter.matches(cloud, 0).map_err(|error| Invalid::at(key, with_nearest(&error)))
 }
 
 /// Drops the points of a cloud that do not meet the filter of a key.
@@ -201,7 +202,8 @@ pub(crate) fn keep_matching(
 ) -> Result<(), Invalid> {
     let n_points = cloud.len();
     cloud.retain_from(0, &matches(cloud, key, filter)?);
-    progress.note(&format!("{} of {} meet {filter}", cloud.len(), counted(n_points, "point")));
+    let points = counted(n_points, "point");
+    progress.note(&format!("{} of {points} meet {}", cloud.len(), filter.describe()));
     Ok(())
 }
 
@@ -327,7 +329,7 @@ pub fn report_prepared(
     }
     report_normals(report, progress);
     if report.radii.is_none() {
-        progress.choice("radii as in the file", &["radius"]);
+        report_scaled_radii("radii as in the file", settings, progress);
     }
     report_radii(report, settings, progress);
     if let Some(structure) = &report.structure {
@@ -347,7 +349,9 @@ pub fn report_denoise(report: &PreparationReport, progress: &dyn Progress) {
 
 /// Reports how normals were estimated.
 pub fn report_normals(report: &PreparationReport, progress: &dyn Progress) {
-    if let (Some(normals), Some(neighborhood)) = (&report.normals, report.normals_from) {
+    // A single point has no neighbours.
+    let normals = report.normals.as_ref().filter(|_| 1 < report.n_points);
+    if let (Some(normals), Some(neighborhood)) = (normals, report.normals_from) {
         let key = match neighborhood {
             Neighborhood::Nearest(_) => "normals_k",
             Neighborhood::Within(_) => "normals_radius",
@@ -363,8 +367,18 @@ pub fn report_radii(
     progress: &dyn Progress,
 ) {
     let radius = settings.preparation.radius.unwrap_or_default();
-    if let (Some(radii), false) = (&report.radii, matches!(radius, Radius::Fixed(_))) {
-        progress.choice(&radii.line(radius), &["radius"]);
+    let is_single = report.n_points == 1;
+    if let (Some(radii), false) = (&report.radii, is_single || matches!(radius, Radius::Fixed(_))) {
+        report_scaled_radii(&radii.line(radius), settings, progress);
+    }
+}
+
+/// Reports radii, and the factor by which the settings multiply them.
+fn report_scaled_radii(line: &str, settings: &ObjectSettings, progress: &dyn Progress) {
+    match settings.surface.radius_scale() {
+        1.0 => progress.choice(line, &["radius"]),
+        factor => progress
+            .choice(&format!("{line}; all multiplied by {factor}"), &["radius", "radius_scale"]),
     }
 }
 

@@ -17,9 +17,13 @@ pub fn report_coverage(image: &Image, progress: &dyn Progress) {
     let covered =
         image.coverage.iter().map(|coverage| f64::from(*coverage)).sum::<f64>() / n_pixels;
     if covered < MIN_COVERAGE {
-        let percent = 100.0 * covered;
+        let share = match 100.0 * covered {
+            0.0 => "nothing".to_owned(),
+            ..0.01 => "less than 0.01 %".to_owned(),
+            percent => format!("only {percent:.2} %"),
+        };
         let line = format!(
-            "warning: only {percent:.2} % of the picture is covered; move the camera nearer, or give points a larger radius"
+            "warning: {share} of the picture is covered; move the camera nearer, or give points a larger radius"
         );
         progress.choice(&line, &["camera.zoom_factor", "camera.focal_point", "radius"]);
     }
@@ -100,8 +104,11 @@ mod tests {
             let image = Image { coverage: vec![coverage; 100], ..Image::new(10, 10) };
             let log = ProgressLog::new(&NoProgress);
             report_coverage(&image, &log);
-            log.into_choices().len()
+            log.into_choices()
         };
-        assert_eq!((lines(0.001), lines(0.01)), (1, 0));
+        assert_eq!((lines(0.001).len(), lines(0.01).len()), (1, 0));
+        assert!(lines(0.001)[0].reason.starts_with("warning: only 0.10 % of the picture"));
+        assert!(lines(1e-5)[0].reason.starts_with("warning: less than 0.01 % of the picture"));
+        assert!(lines(0.0)[0].reason.starts_with("warning: nothing of the picture"));
     }
 }

@@ -182,8 +182,11 @@ fn choose_sky(settings: &mut SkySettings, context: &LightingContext, progress: &
     settings.fill_defaults();
     if settings.ao_distance.is_none() {
         let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
-        let line = format!("things up to {} away darken the sky", format_length(distance));
-        progress.choice(&line, &["sky.ao_distance"]);
+        // A single point darkens nothing.
+        if 0.0 < context.diagonal {
+            let line = format!("things up to {} away darken the sky", format_length(distance));
+            progress.choice(&line, &["sky.ao_distance"]);
+        }
         settings.ao_distance = Some(distance.into());
     }
 }

@@ -66,7 +66,7 @@ fn without_sun(
         let advice = "choose another time, or add another light, as in --light sun,sky";
         return Err(Invalid::at("sun", format!("{below}; {advice}")));
     }
-    progress.note(&format!("{below}: it gives no light"));
+    progress.note(&format!("warning: {below}: it gives no light"));
     description.light.light = Some(kinds);
     Ok(())
 }

@@ -54,6 +54,12 @@ impl LoadedScene {
             }
             let info = self.file_info();
             let columns = colorable_columns(&info.columns);
+            if color == ColorSource::Class && columns.contains(&"class") {
+                let files = list_files(self.files_of(i, description));
+                return Err(Error::Unfit(format!(
+                    "{files}: all classes are zero; choose another --color"
+                )));
+            }
             return Err(Error::Unfit(format!(
                 "{}: no column {color}{}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
                  name and what the file has: {}",

@@ -1,12 +1,10 @@
 //! Warnings of settings that change nothing in the scene or in the file of its picture.
 
-use super::super::appearance::{material_of_file, material_of_object};
 use super::LoadedScene;
-use crate::description::{PreparationSettings, SceneDescription};
+use crate::description::{PreparationSettings, SceneDescription, misspelled};
 use surfel_core::progress::Progress;
 use surfel_core::scene::Background;
-use surfel_core::surface::SurfaceKind;
-use surfel_formats::{BitDepth, FileInfo};
+use surfel_formats::{BitDepth, FileInfo, TextColumn};
 
 impl LoadedScene {
     /// Warns of settings that have no effect.
@@ -14,27 +12,7 @@ impl LoadedScene {
         report_unused_of_output(description, progress);
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
-        self.report_unused_materials(description, progress);
         self.report_unused_of_points(description, progress);
-    }
-
-    /// Warns of materials of points that are drawn as pixels.
-    fn report_unused_materials(&self, description: &SceneDescription, progress: &dyn Progress) {
-        let is_unused = |i: usize| {
-            let material = match self.owners[i] {
-                Some(object) => material_of_object(description, &description.objects[object]),
-                None => self.files_of(i, description).first().and_then(|file| {
-                    material_of_file(description, file).map(|choice| &choice.material)
-                }),
-            };
-            let surface = self.settings_of(i, description).surface.surface();
-            let has_reflections = |kind: String| !["matte", "unlit"].contains(&kind.as_str());
-            surface == SurfaceKind::Points && material.is_some_and(|m| has_reflections(m.kind()))
-        };
-        if self.clouds().any(|(i, _)| is_unused(i)) {
-            let line = "warning: the surface points shows nothing of a material but its colour";
-            progress.choice(line, &["surface", "material"]);
-        }
     }
 
     /// Warns of settings that choose or colour points in a scene without points.
@@ -60,7 +38,7 @@ impl LoadedScene {
     }
 }
 
-/// Warns of settings for files of a kind that is not there.
+/// Warns of settings for files of a kind that is not there, and of columns that are probably misspelled.
 pub(crate) fn report_unused_of_files<'i>(
     infos: impl IntoIterator<Item = &'i FileInfo>,
     settings: &PreparationSettings,
@@ -72,6 +50,15 @@ pub(crate) fn report_unused_of_files<'i>(
         let line =
             "warning: no effect, since no file is text: all other formats name their columns";
         progress.choice(line, &["columns"]);
+    }
+    for column in TextColumn::parse_list(settings.columns.as_deref().unwrap_or_default()) {
+        let Some(name) = column.scalar() else { continue };
+        if let Some(meant) = misspelled(name, TextColumn::NAMES) {
+            let line = format!(
+                "warning: column `{name}` has no meaning; the nearest known one is `{meant}`"
+            );
+            progress.choice(&line, &["columns"]);
+        }
     }
     if settings.animation_name.is_some() && has_none("glTF") {
         let line = "warning: no effect, since no file is glTF: only these have animations";
