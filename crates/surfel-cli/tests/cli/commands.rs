@@ -338,6 +338,14 @@ fn points_are_chosen_by_an_area() {
 }
 
 #[test]
+fn no_more_neighbours_are_told_than_there_are() {
+    let folder = Folder::new();
+    let cloud = folder.write("few.xyz", square(3, 200));
+    let text = stderr(&surfel(&["prepare", &cloud, "-o", &folder.path("few.ply")]));
+    assert!(text.contains("through 8 neighbours") && text.contains("the 8th neighbour"), "{text}");
+}
+
+#[test]
 fn the_range_of_filtered_colours_is_told() {
     let folder = Folder::new();
     let cloud = folder.write("grey.xyz", square(10, 200));

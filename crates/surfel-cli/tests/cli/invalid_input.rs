@@ -111,6 +111,21 @@ fn the_error_for_a_missing_column_lists_those_of_the_file() {
 }
 
 #[test]
+fn classes_that_are_all_zero_are_reported_where_they_are_asked_for() {
+    let folder = Folder::new();
+    let cloud = folder.write("grey.xyz", square(10, 200));
+    let las = folder.path("grey.las");
+    succeed(&["prepare", &cloud, "-o", &las, "--duplicates", "keep"]);
+    let picture = folder.path("out.png");
+    let render = ["render", &las, "-o", &picture, "--resolution", "32x24"];
+    let text = stderr(&surfel(&render));
+    assert!(!text.contains("classes"), "{text}");
+    let text = fail(&[&render[..], &["--color", "class"]].concat(), 1);
+    assert!(text.contains("grey.las: all classes are zero"), "{text}");
+    assert!(stderr(&surfel(&["info", &las])).contains("all classes are zero"));
+}
+
+#[test]
 fn a_filter_of_an_unknown_column_is_answered_with_the_nearest() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));

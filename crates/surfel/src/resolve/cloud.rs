@@ -356,6 +356,11 @@ pub fn report_normals(report: &PreparationReport, progress: &dyn Progress) {
             Neighborhood::Nearest(_) => "normals_k",
             Neighborhood::Within(_) => "normals_radius",
         };
+        let there_are = report.n_points - 1;
+        let neighborhood = match neighborhood {
+            Neighborhood::Nearest(k) => Neighborhood::Nearest(k.min(there_are)),
+            within => within,
+        };
         progress.choice(&normals.line(neighborhood), &[key]);
     }
 }
@@ -366,7 +371,12 @@ pub fn report_radii(
     settings: &ObjectSettings,
     progress: &dyn Progress,
 ) {
-    let radius = settings.preparation.radius.unwrap_or_default();
+    let there_are = report.n_points.saturating_sub(1);
+    let radius = match settings.preparation.radius.unwrap_or_default() {
+        Radius::Adaptive { k } => Radius::Adaptive { k: k.min(there_are) },
+        Radius::Curvature { k } => Radius::Curvature { k: k.min(there_are) },
+        other => other,
+    };
     let is_single = report.n_points == 1;
     if let (Some(radii), false) = (&report.radii, is_single || matches!(radius, Radius::Fixed(_))) {
         report_scaled_radii(&radii.line(radius), settings, progress);

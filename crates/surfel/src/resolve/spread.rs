@@ -18,7 +18,7 @@ pub fn report_coverage(image: &Image, progress: &dyn Progress) {
         image.coverage.iter().map(|coverage| f64::from(*coverage)).sum::<f64>() / n_pixels;
     if covered < MIN_COVERAGE {
         let share = match 100.0 * covered {
-            0.0 => "nothing".to_owned(),
+            0.0 => "no part".to_owned(),
             ..0.01 => "less than 0.01 %".to_owned(),
             percent => format!("only {percent:.2} %"),
         };
@@ -109,6 +109,6 @@ mod tests {
         assert_eq!((lines(0.001).len(), lines(0.01).len()), (1, 0));
         assert!(lines(0.001)[0].reason.starts_with("warning: only 0.10 % of the picture"));
         assert!(lines(1e-5)[0].reason.starts_with("warning: less than 0.01 % of the picture"));
-        assert!(lines(0.0)[0].reason.starts_with("warning: nothing of the picture"));
+        assert!(lines(0.0)[0].reason.starts_with("warning: no part of the picture"));
     }
 }
