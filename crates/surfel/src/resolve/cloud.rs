@@ -349,14 +349,14 @@ pub fn report_denoise(report: &PreparationReport, progress: &dyn Progress) {
 
 /// Reports how normals were estimated.
 pub fn report_normals(report: &PreparationReport, progress: &dyn Progress) {
-    // A single point has no neighbours.
-    let normals = report.normals.as_ref().filter(|_| 1 < report.n_points);
+    // Those of points without a plane are reported as repairs.
+    let normals = report.normals.as_ref().filter(|normals| 0 < normals.n_estimated);
     if let (Some(normals), Some(neighborhood)) = (normals, report.normals_from) {
         let key = match neighborhood {
             Neighborhood::Nearest(_) => "normals_k",
             Neighborhood::Within(_) => "normals_radius",
         };
-        let there_are = report.n_points - 1;
+        let there_are = report.n_points.saturating_sub(1);
         let neighborhood = match neighborhood {
             Neighborhood::Nearest(k) => Neighborhood::Nearest(k.min(there_are)),
             within => within,
