@@ -13,7 +13,7 @@ const SEEDS_PER_NEIGHBORS: usize = 3;
 /// Numbers of neighbours, in multiples of those of other surfaces, and the greatest root mean square height, in standard
 /// deviations of the noise, of the cubic through them over their plane. Each plane starts from the one before; the first
 /// one is not judged.
-const SCALES: [(usize, f32); 3] = [(1, f32::INFINITY), (4, 0.55), (8, 0.3)];
+const SCALES: [(usize, f32); 3] = [(1, f32::INFINITY), (4, 0.55), (8, 0.29)];
 /// Maximum number of neighbours around a point, and of those among them that take part.
 const MAX_NEIGHBORS: usize = 2048;
 const MAX_FITTED: usize = 512;
@@ -29,7 +29,7 @@ const MARGIN: f32 = 1.5;
 /// Minimum ratio of the middle to the largest eigenvalue: many planes pass through a narrow strip.
 const MIN_WIDTH: f64 = 0.1;
 /// Maximum ratio of the variance of the neighbours to that of the noise.
-const MAX_VARIANCE_RATIO: f32 = 2.5;
+const MAX_VARIANCE_RATIO: f32 = 1.8;
 /// Number of planes around a point among which that of its face is sought.
 const N_NEAREST: usize = 48;
 /// Minimum number of neighbours that tell the planes on which a point may be.
@@ -69,7 +69,7 @@ enum Around {
 pub struct FlatFaces {
     /// The surface around some of the points.
     samples: Vec<Around>,
-    /// Where these are.
+    /// Positions of these.
     places: Vec<Vec3>,
 }
 
