@@ -158,8 +158,7 @@ pub fn find_shapes<'a>(
     };
     let voters = std::mem::take(voters);
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
-        // A single point has no neighbours to lie in a line or a plane with.
-        (StructureChoice::Auto, Some((fits, _))) if 1 < cloud.len() => {
+        (StructureChoice::Auto, Some((fits, _))) if has_structure(fits) => {
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });
@@ -204,6 +203,16 @@ pub fn find_shapes<'a>(
     report.update(radii);
     estimates.tree = Some(tree);
     Ok(Some((shapes, found)))
+}
+
+/// True unless all points stand for themselves: a single point, and the corners of a triangle, of which no more than two
+/// lie around a hit.
+fn has_structure(fits: &[PlaneFit]) -> bool {
+    match fits {
+        [] | [_] => false,
+        [_, _, _] => fits.iter().all(|fit| fit.normal == Vec3::ZERO),
+        _ => true,
+    }
 }
 
 fn fit_planes(

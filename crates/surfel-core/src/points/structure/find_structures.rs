@@ -254,6 +254,14 @@ mod tests {
     }
 
     #[test]
+    fn the_corners_of_a_triangle_stand_for_themselves() {
+        let (_, structures) = prepared(vec![Vec3::ZERO, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)]);
+        assert_eq!(structures, [Structure::Scatter; 3]);
+        let (_, structures) = prepared(vec![Vec3::ZERO, Vec3::Y, 2.0 * Vec3::Y]);
+        assert_eq!(structures, [Structure::Line; 3]);
+    }
+
+    #[test]
     fn noise_of_a_surface_is_not_foliage() {
         for noise in [0.3, 0.6] {
             let mut random = Random::new(5, 0);
