@@ -193,7 +193,7 @@ pub fn from_core(error: surfel_core::Error) -> Invalid {
             expected(format_args!("{what}{}", nearest_word(&found, what)))
         }
         surfel_core::Error::UnknownName { found, known, .. } => {
-            expected(format_args!("one of {known}{}", did_you_mean(&found, &known)))
+            expected(format_args!("one of {known}{}", nearest_if_any(&found, known.split(", "))))
         }
         other => Invalid::new(other.to_string()),
     }
@@ -206,10 +206,6 @@ fn nearest_word(found: &str, list: &str) -> String {
     nearest_if_any(found, names.filter(|name| !name.contains(' ')))
 }
 
-fn did_you_mean(found: &str, known: &str) -> String {
-    nearest_if_any(found, known.split(", "))
-}
-
 /// One of a few names.
 pub struct OneOf<T: 'static>(pub &'static [(&'static str, T)]);
 
@@ -218,11 +214,9 @@ impl<T: Clone + PartialEq> Rule<T> for OneOf<T> {
         let known = self.0.iter().find(|(name, _)| value.as_str() == Some(name));
         known.map(|(_, value)| value.clone()).ok_or_else(|| {
             let names: Vec<&str> = self.0.iter().map(|(name, _)| *name).collect();
-            let names = names.join(", ");
-            expected(format_args!(
-                "one of {names}{}",
-                did_you_mean(value.as_str().unwrap_or_default(), &names)
-            ))
+            let list = names.join(", ");
+            let advice = nearest_if_any(value.as_str().unwrap_or_default(), names);
+            expected(format_args!("one of {list}{advice}"))
         })
     }
 

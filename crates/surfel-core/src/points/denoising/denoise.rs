@@ -5,7 +5,7 @@
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
 use super::depth_steps::DepthSteps;
-use super::flat_faces::{FlatFaces, MIN_WITNESSES, spacing};
+use super::flat_faces::{FlatFaces, Witnesses};
 use super::noise::{GROUP_SIZE, Noise};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -203,12 +203,9 @@ fn moved(
         if count == 0 {
             return Ok((*position, Vec3::ZERO));
         }
-        let n_witnesses = MIN_WITNESSES.max(count as usize);
-        let neighbors = tree.nearest(*position, n_witnesses, Some(point as u32));
         let noise = noises[point].unwrap_or_default();
-        let witnesses = neighbors.iter().map(|neighbor| positions[neighbor.index as usize]);
-        let deviation = noise * spacing(&neighbors);
-        if let Some(moved) = faces.moved(&places, *position, witnesses.collect(), deviation) {
+        let witnesses = || Witnesses::around(tree, point, count as usize, noise);
+        if let Some(moved) = faces.moved(&places, *position, witnesses) {
             return Ok(moved);
         }
         let is_grouped = MIN_GROUPED <= count;

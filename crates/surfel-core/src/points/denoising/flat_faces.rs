@@ -33,7 +33,7 @@ const MAX_VARIANCE_RATIO: f32 = 1.8;
 /// Number of planes around a point among which that of its face is sought.
 const N_NEAREST: usize = 48;
 /// Minimum number of neighbours that tell the planes on which a point may be.
-pub const MIN_WITNESSES: usize = 24;
+const MIN_WITNESSES: usize = 24;
 /// Minimum fraction of them on a plane.
 const MIN_ON_PLANE: f32 = 0.3;
 /// Maximum number of points, for each plane of a face, around which the face bends.
@@ -132,16 +132,19 @@ impl FlatFaces {
     /// Returns a point moved onto the plane of its face, or onto the edge if it lies beyond, and the normal of the face,
     /// zero near an edge. Returns none if the point is on no flat face.
     ///
-    /// `places` is [`Self::tree`], `neighbors` are those of the point, and `noise` is the standard deviation around it.
+    /// `places` is [`Self::tree`]. The `witnesses` around the point are asked for only if a flat face is near.
     pub fn moved(
         &self,
         places: &KdTree,
         position: Vec3,
-        neighbors: Vec<Vec3>,
-        noise: f32,
+        witnesses: impl FnOnce() -> Witnesses,
     ) -> Option<(Vec3, Vec3)> {
-        let witnesses = Witnesses { positions: neighbors, noise };
-        let mut faces = self.faces_at(places, position, &witnesses);
+        let (planes, bent) = self.near(places, position);
+        if planes.is_empty() {
+            return None;
+        }
+        let witnesses = witnesses();
+        let mut faces = witnesses.faces(planes, &bent, position);
         faces.retain(|face| witnesses.is_on(face, position));
         let height = |face: &Plane| face.height(position).abs();
         let own = *faces.iter().min_by(|a, b| height(a).total_cmp(&height(b)))?;
@@ -156,33 +159,19 @@ impl FlatFaces {
         Some((moved, if faces.is_empty() { own.normal } else { Vec3::ZERO }))
     }
 
-    /// Returns the planes, one a face, on which enough of the neighbours of a position lie.
-    fn faces_at(&self, places: &KdTree, position: Vec3, witnesses: &Witnesses) -> Vec<Plane> {
+    /// Returns the planes that are known at a position, each with its distance, and the places around it where the surface
+    /// bends.
+    fn near(&self, places: &KdTree, position: Vec3) -> (Vec<(Plane, f32)>, Vec<Vec3>) {
         let (mut planes, mut bent) = (Vec::new(), Vec::new());
         for sample in places.nearest(position, N_NEAREST, None) {
+            let distance = sample.distance_squared.sqrt();
             match self.samples[sample.index as usize] {
-                Around::Flat(plane) => planes.push((plane, sample.distance_squared.sqrt())),
-                Around::Bent(position) => bent.push(position),
+                Around::Flat(plane) if distance < plane.reach => planes.push((plane, distance)),
+                Around::Flat(_) => {}
+                Around::Bent(place) => bent.push(place),
             }
         }
-        planes.retain(|(plane, distance)| *distance < plane.reach && witnesses.are_on(plane));
-        let mut faces = Vec::new();
-        while let Some((first, _)) = planes.first().copied() {
-            let is_same = |(plane, _): &(Plane, f32)| {
-                let cosine = first.normal.dot(plane.normal);
-                let height = plane.height(position) * cosine.signum();
-                let step = (first.height(position) - height).abs();
-                MIN_SAME_FACE < cosine.abs() && step < witnesses.noise
-            };
-            let (same, others): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_same);
-            let face = Plane::mean(&same, position);
-            let n_bent = bent.iter().filter(|bent| witnesses.is_on(&face, **bent)).count();
-            if n_bent <= MAX_BENT * same.len() {
-                faces.push(face);
-            }
-            planes = others;
-        }
-        faces
+        (planes, bent)
     }
 }
 
@@ -295,13 +284,46 @@ impl Plane {
 }
 
 /// The neighbours of a point, which tell the faces that it may be on.
-struct Witnesses {
+pub struct Witnesses {
     positions: Vec<Vec3>,
     /// Standard deviation of the noise.
     noise: f32,
 }
 
 impl Witnesses {
+    /// Returns the neighbours of a point: as many as take part on other surfaces, or more. `noise` is in spacings.
+    pub fn around(tree: &KdTree, point: usize, count: usize, noise: f32) -> Self {
+        let positions = tree.positions();
+        let n_neighbors = MIN_WITNESSES.max(count);
+        let neighbors = tree.nearest(positions[point], n_neighbors, Some(point as u32));
+        let noise = noise * spacing(&neighbors);
+        let position = |neighbor: &Neighbor| positions[neighbor.index as usize];
+        Self { positions: neighbors.iter().map(position).collect(), noise }
+    }
+
+    /// Returns the mean plane of each face on which enough of the neighbours lie. `planes` are those near `position`, with
+    /// their distances, and `bent` the places where the surface bends.
+    fn faces(&self, mut planes: Vec<(Plane, f32)>, bent: &[Vec3], position: Vec3) -> Vec<Plane> {
+        planes.retain(|(plane, _)| self.are_on(plane));
+        let mut faces = Vec::new();
+        while let Some((first, _)) = planes.first().copied() {
+            let is_same = |(plane, _): &(Plane, f32)| {
+                let cosine = first.normal.dot(plane.normal);
+                let height = plane.height(position) * cosine.signum();
+                let step = (first.height(position) - height).abs();
+                MIN_SAME_FACE < cosine.abs() && step < self.noise
+            };
+            let (same, others): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_same);
+            let face = Plane::mean(&same, position);
+            let n_bent = bent.iter().filter(|place| self.is_on(&face, **place)).count();
+            if n_bent <= MAX_BENT * same.len() {
+                faces.push(face);
+            }
+            planes = others;
+        }
+        faces
+    }
+
     fn is_on(&self, plane: &Plane, position: Vec3) -> bool {
         plane.height(position).abs() < MAX_HEIGHT * self.noise
     }
@@ -329,7 +351,7 @@ impl Witnesses {
 }
 
 /// Returns the spacing of points on a surface that has these neighbours, nearest first.
-pub fn spacing(neighbors: &[Neighbor]) -> f32 {
+fn spacing(neighbors: &[Neighbor]) -> f32 {
     let reach = neighbors.last().map_or(0.0, |last| last.distance_squared);
     (std::f32::consts::PI * reach / (neighbors.len() + 1) as f32).sqrt()
 }
