@@ -9,7 +9,7 @@ use super::normals::planes::{PlaneFit, fit_plane};
 use super::preparation::Preparation;
 use super::radii::radius::{DistanceSample, RadiusReport, median_distance};
 use super::radii::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
-use super::scan::grid_rays::located_grids;
+use super::scan::scan_grid::ScanGrids;
 use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
 use super::structure::find_structures::{all_scattered, find_structures};
@@ -166,7 +166,7 @@ pub fn find_shapes<'a>(
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
-    let grids = if preparation.free_space { located_grids(cloud) } else { None };
+    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
     let free_space = match &grids {
         Some(grids) => FreeSpace::new(grids, &cloud.positions, progress)?,
         None => FreeSpace::default(),

@@ -59,6 +59,7 @@ pub use radii::radius::{
     DEFAULT_RADIUS_SAMPLES, DistanceSample, Radius, RadiusReport, estimate_radii, median_distance,
     spacing,
 };
+pub use scan::grid_rays::locate_stations;
 pub use scan::mixed_pixels::MixedPixels;
 pub use scan::scan_angle::{POINT_SOURCE, SCAN_ANGLE};
 pub use structure::point_shape::{

@@ -5,6 +5,7 @@ use surfel_core::words::counted;
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
+use surfel_core::points::locate_stations;
 use surfel_core::progress::{NoProgress, Progress};
 
 use super::document::{Document, read_document, read_header, salvage_document};
@@ -122,6 +123,12 @@ pub(crate) fn read(
     let stations = scans.iter().zip(&document.scans).enumerate();
     let stations = stations.map(|(i, (scan, description))| scan.station(i, description));
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
+    let n_located = locate_stations(&mut cloud);
+    if 0 < n_located {
+        let scans = counted(n_located, "scan");
+        let line = format!("{scans} without a pose: the rays of the grid start at 0,0,0");
+        progress.note(&format!("{}: {line}", input.name));
+    }
     Ok(Loaded { cloud, info })
 }
 

@@ -103,11 +103,12 @@ impl Scan {
         })
     }
 
-    /// Returns the station of the scan, which is the `index`-th of the file.
+    /// Returns the station of the scan, which is the `index`-th of the file. Ranges and angles are measured from it.
     pub fn station(&self, index: usize, description: &PointCloud) -> ScanStation {
+        let is_known = description.transform.is_some() || self.cartesian.is_none();
         ScanStation {
             name: scan_name(index, description),
-            position: description.transform.is_some().then_some(self.translation),
+            position: is_known.then_some(self.translation),
             rotation: self.rotation,
         }
     }

@@ -143,8 +143,45 @@ fn spherical_coordinates_are_converted_and_invalid_points_skipped() {
     let cloud = load_bytes("a.e57", &bytes, &LoadOptions::default(), &listener).unwrap().cloud;
     let expected = [2.0 * Vec3::X, 3.0 * Vec3::Y, 4.0 * Vec3::Z];
     assert_eq!(cloud.len(), 3);
+    assert_eq!(cloud.stations[0].position, Some(DVec3::ZERO));
     assert!(cloud.positions.iter().zip(expected).all(|(a, b)| a.distance(b) < 1e-6));
     assert!(listener.has_note("skipped 1 of 4 points: no valid position"));
+}
+
+#[test]
+fn the_rays_of_a_grid_tell_the_station_of_a_scan_without_a_pose() {
+    let bytes_from = |station: [f64; 3]| {
+        let index = RecordDataType::Integer { min: 0, max: 39 };
+        let point = |cell: i64| {
+            let (row, column) = (cell / 40, cell % 40);
+            let range = 2.0 + (row * column % 5) as f64;
+            let [azimuth, elevation] = [column, row].map(|index| 0.01 * (index - 20) as f64);
+            let ((sin, cos), (up, level)) = (azimuth.sin_cos(), elevation.sin_cos());
+            let offset = [level * cos, level * sin, up].map(|value| range * value);
+            let position = [0, 1, 2].map(|axis| station[axis] + offset[axis]);
+            let indices = [row, column].map(RecordValue::Integer);
+            [position.map(RecordValue::Double).to_vec(), indices.to_vec()].concat()
+        };
+        write(&[Scan {
+            name: "hall",
+            pose: None,
+            prototype: vec![
+                Record::CARTESIAN_X_F64,
+                Record::CARTESIAN_Y_F64,
+                Record::CARTESIAN_Z_F64,
+                record(RecordName::RowIndex, index.clone()),
+                record(RecordName::ColumnIndex, index),
+            ],
+            points: (0..1600).map(point).collect(),
+        }])
+    };
+    let listener = Listener::default();
+    let options = LoadOptions::default();
+    let cloud = load_bytes("a.e57", &bytes_from([0.0; 3]), &options, &listener).unwrap().cloud;
+    assert_eq!(cloud.stations[0].position, Some(DVec3::ZERO));
+    assert!(listener.has_note("1 scan without a pose: the rays of the grid start at 0,0,0"));
+    let moved = read("a.e57", bytes_from([0.5, -0.5, 0.2])).unwrap().cloud;
+    assert_eq!(moved.stations[0].position, None);
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use super::scan_grid::{ScanGrid, ScanGrids};
 use crate::math::{DVec3, Vec3, median};
-use crate::points::PointCloud;
+use crate::points::{PointCloud, ScanStation};
 use std::f64::consts::{PI, TAU};
 
 /// Number of rays with points that the steps are found from.
@@ -55,17 +55,25 @@ struct Sample {
     elevation: f64,
 }
 
-/// Returns the grids of the scans whose station is known; `None` if there are none. A station that the file does not state
-/// is at the zero of the world coordinates if the grid's rays have equal steps as seen from there.
-pub fn located_grids(cloud: &PointCloud) -> Option<ScanGrids> {
-    let mut grids = ScanGrids::new(cloud)?;
-    for scan in &mut grids.scans {
-        let is_located = |grid: &mut ScanGrid| {
-            grid.is_station_stated || GridRays::new(grid, &cloud.positions).is_some()
-        };
-        *scan = scan.take_if(is_located);
+/// Sets the positions of stations that are not stated to the zero of the world coordinates if the rays of their grids have
+/// equal steps as seen from there. Returns the number of the stations found.
+pub fn locate_stations(cloud: &mut PointCloud) -> usize {
+    let is_unknown = |station: &ScanStation| station.position.is_none();
+    let unknown: Vec<usize> =
+        (0..cloud.stations.len()).filter(|scan| is_unknown(&cloud.stations[*scan])).collect();
+    for &scan in &unknown {
+        cloud.stations[scan].position = Some(DVec3::ZERO);
     }
-    grids.scans.iter().any(Option::is_some).then_some(grids)
+    let grids = if unknown.is_empty() { None } else { ScanGrids::new(cloud) };
+    let has_rays = |scan: usize| {
+        let grid = grids.as_ref().and_then(|grids| grids.scans[scan].as_ref());
+        grid.is_some_and(|grid| GridRays::new(grid, &cloud.positions).is_some())
+    };
+    let wrong: Vec<usize> = unknown.iter().copied().filter(|scan| !has_rays(*scan)).collect();
+    for &scan in &wrong {
+        cloud.stations[scan].position = None;
+    }
+    unknown.len() - wrong.len()
 }
 
 impl GridRays {
@@ -292,12 +300,17 @@ mod tests {
         let range = |row: usize, column: usize| Some(2.0 + ((row * column) % 5) as f32);
         let mut cloud = scan(40, 40, range);
         cloud.stations[0].position = None;
-        let grids = located_grids(&cloud).unwrap();
-        assert_eq!(grids.scans[0].as_ref().unwrap().station, Vec3::ZERO);
-        cloud.positions.iter_mut().for_each(|position| *position += Vec3::new(0.5, -0.5, 0.2));
-        assert!(located_grids(&cloud).is_none());
-        cloud.stations[0].position = Some(DVec3::new(0.5, -0.5, 0.2));
-        assert!(located_grids(&cloud).is_some());
+        assert!(ScanGrids::new(&cloud).is_none());
+        assert_eq!(locate_stations(&mut cloud), 1);
+        assert_eq!(cloud.stations[0].position, Some(DVec3::ZERO));
+        let elsewhere = DVec3::new(0.5, -0.5, 0.2);
+        cloud.positions.iter_mut().for_each(|position| *position += elsewhere.as_vec3());
+        cloud.stations[0].position = None;
+        assert_eq!(locate_stations(&mut cloud), 0);
+        assert_eq!(cloud.stations[0].position, None);
+        cloud.stations[0].position = Some(elsewhere);
+        assert_eq!(locate_stations(&mut cloud), 0);
+        assert_eq!(cloud.stations[0].position, Some(elsewhere));
     }
 
     #[test]

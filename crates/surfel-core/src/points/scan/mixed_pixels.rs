@@ -5,8 +5,7 @@
 //! are nearly along the ray: at an incidence above 80 degrees. On a surface that rays graze all lines are so; there the
 //! lines between the points beyond decide.
 
-use super::grid_rays::located_grids;
-use super::scan_grid::ScanGrid;
+use super::scan_grid::{ScanGrid, ScanGrids};
 use crate::math::Vec3;
 use crate::points::PointCloud;
 use rayon::prelude::*;
@@ -32,7 +31,7 @@ pub enum MixedPixels {
 
 /// Returns the points of a cloud that are no mixed pixels; `None` if it has none, or no grids.
 pub fn without_mixed_pixels(cloud: &PointCloud) -> Option<Vec<u32>> {
-    let grids = located_grids(cloud)?;
+    let grids = ScanGrids::new(cloud)?;
     let mut mixed: Vec<u32> = Vec::new();
     for grid in grids.scans.iter().flatten() {
         let cells: Vec<([usize; 2], usize)> = grid.cells().collect();

@@ -14,8 +14,6 @@ const MAX_FURTHER_RAYS: usize = 4096;
 pub struct ScanGrid {
     /// Position of the scanner, relative to the origin of the cloud.
     pub station: Vec3,
-    /// False if the station is the zero of the world coordinates only because nothing states another place.
-    pub is_station_stated: bool,
     /// Rotation from the scanner's axes to those of the world.
     pub rotation: DQuat,
     /// Number of rows.
@@ -41,17 +39,14 @@ struct Extent {
 }
 
 impl ScanGrids {
-    /// Returns the grids of the scans; `None` if there are none. A station of unknown position is taken to be at the zero
-    /// of the world coordinates.
+    /// Returns the grids of the scans whose station is known; `None` if there are none.
     pub fn new(cloud: &PointCloud) -> Option<Self> {
         let indices = [cloud.scalar(ROW_INDEX)?, cloud.scalar(COLUMN_INDEX)?];
         let scan_of = cloud.scan_of_point()?;
         let extents = extents(cloud, indices, &scan_of);
         let grid = |(station, extent): (&crate::points::ScanStation, Extent)| {
-            let position = station.position.unwrap_or_default();
-            let grid =
-                ScanGrid::empty((position - cloud.origin).as_vec3(), station.rotation, &extent)?;
-            Some(ScanGrid { is_station_stated: station.position.is_some(), ..grid })
+            let position = (station.position? - cloud.origin).as_vec3();
+            ScanGrid::empty(position, station.rotation, &extent)
         };
         let mut scans: Vec<Option<ScanGrid>> =
             cloud.stations.iter().zip(extents.iter().copied()).map(grid).collect();
@@ -80,7 +75,7 @@ impl ScanGrid {
             return None;
         }
         let points = vec![NO_POINT; n_rays];
-        Some(Self { station, is_station_stated: true, rotation, n_rows, n_columns, points })
+        Some(Self { station, rotation, n_rows, n_columns, points })
     }
 
     /// Returns the point of a ray; `None` beyond the grid and where the ray measured nothing.
