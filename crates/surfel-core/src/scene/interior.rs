@@ -3,7 +3,7 @@
 use super::camera::Camera;
 use super::clip::ClipPlane;
 use super::ground::ground_axes;
-use super::inliers::sample_inliers;
+use super::inliers::{range_along, sample_inliers};
 use crate::math::{DVec3, Vec3};
 use crate::points::PointCloud;
 
@@ -44,9 +44,23 @@ pub struct Room {
     high: [f32; 3],
     /// True if there are points well within.
     has_content: bool,
+    /// True if points cover the ceiling.
+    has_ceiling: bool,
 }
 
-/// Returns the room that a cloud shows, or `None` if its points do not cover a floor, a ceiling and three walls.
+/// The sides of a box that points cover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Enclosure {
+    /// Too few for a room.
+    Open,
+    /// The floor and four walls: depth cameras rarely look up.
+    WithoutCeiling,
+    /// The floor, the ceiling and at least three walls.
+    WithCeiling,
+}
+
+/// Returns the room that a cloud shows, or `None` if its points do not cover a floor, and a ceiling and three walls or four
+/// walls.
 pub fn find_room(cloud: &PointCloud, up: Vec3) -> Option<Room> {
     const MIN_POINTS: usize = 1000;
     let points = sample_inliers(cloud);
@@ -57,9 +71,18 @@ pub fn find_room(cloud: &PointCloud, up: Vec3) -> Option<Room> {
     let few: Vec<Vec3> = points.iter().step_by(step).copied().collect();
     let rooms = (0..45).map(|step| box_at(&few, up, 2.0 * step as f32));
     let (room, _) = rooms.max_by(|(_, a), (_, b)| a.cmp(b))?;
+    let enclosure = room.enclosure(&points);
+    if !room.is_high() || enclosure == Enclosure::Open {
+        return None;
+    }
+    let has_ceiling = enclosure == Enclosure::WithCeiling;
+    let [first, second, mut top] = room.high;
+    if !has_ceiling {
+        top = top.max(range_along(&points, room.axes[2]).1);
+    }
+    let high = [first, second, top];
     let has_content = MIN_CONTENT <= room.content(&points);
-    let room = Room { origin: cloud.origin, has_content, ..room };
-    (room.is_high() && room.is_enclosed(&points)).then_some(room)
+    Some(Room { origin: cloud.origin, high, has_content, has_ceiling, ..room })
 }
 
 /// Returns the box of the densest layers for an azimuth, and the number of points in the layers of its walls.
@@ -70,12 +93,13 @@ fn box_at(points: &[Vec3], up: Vec3, azimuth_deg: f32) -> (Room, usize) {
     let sides = axes.map(|axis| densest_layers(points, axis));
     let n_in_walls = sides[..2].iter().map(|side| side.2).sum();
     let (low, high) = (sides.map(|side| side.0), sides.map(|side| side.1));
-    (Room { origin: DVec3::ZERO, axes, low, high, has_content: false }, n_in_walls)
+    let origin = DVec3::ZERO;
+    (Room { origin, axes, low, high, has_content: false, has_ceiling: false }, n_in_walls)
 }
 
 /// Returns the coordinates of the densest layer near each end of an axis, and the number of points in both.
 fn densest_layers(points: &[Vec3], axis: Vec3) -> (f32, f32, usize) {
-    let (low, high) = super::inliers::range_along(points, axis);
+    let (low, high) = range_along(points, axis);
     let thickness = ((high - low) / N_LAYERS as f32).max(f32::MIN_POSITIVE);
     let mut counts = [0usize; N_LAYERS];
     for point in points {
@@ -124,8 +148,8 @@ impl Room {
         points.iter().filter(is_within).count() as f64 / points.len() as f64
     }
 
-    /// Returns true if points cover the floor, the ceiling and at least three walls.
-    fn is_enclosed(&self, points: &[Vec3]) -> bool {
+    /// Returns which sides points cover.
+    fn enclosure(&self, points: &[Vec3]) -> Enclosure {
         let mut is_covered = [[[false; N_CELLS * N_CELLS]; 2]; 3];
         let thickness = self.wall_thickness();
         let mut n_on_sides = 0;
@@ -157,7 +181,12 @@ impl Room {
         let [first, second, vertical] = is_covered;
         let n_walls = first.iter().chain(&second).filter(|wall| is_closed(wall)).count();
         let is_hollow = MIN_ON_SIDES * points.len() as f64 <= n_on_sides as f64;
-        is_hollow && 3 <= n_walls && vertical.iter().all(is_closed)
+        let [has_floor, has_ceiling] = [0, 1].map(|side| is_closed(&vertical[side]));
+        match (is_hollow && has_floor, has_ceiling, n_walls) {
+            (true, true, 3..) => Enclosure::WithCeiling,
+            (true, false, 4) => Enclosure::WithoutCeiling,
+            _ => Enclosure::Open,
+        }
     }
 
     /// Returns true if there are points well within the room: furniture, or people.
@@ -209,7 +238,7 @@ impl Room {
                 let point = self.origin + (coordinate * self.axes[axis]).as_dvec3();
                 planes.push(ClipPlane { point, normal: normal.as_dvec3() });
             };
-            if self.high[axis] < position {
+            if self.high[axis] < position && (axis < 2 || self.has_ceiling) {
                 hide(normal, high);
             } else if position < self.low[axis] && axis < 2 {
                 hide(-normal, low);
@@ -277,11 +306,21 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_and_a_room_without_ceiling_are_no_rooms() {
+    fn a_room_without_a_ceiling_needs_four_walls_and_a_floor() {
         let cloud = room(0.0, true);
-        let open = cloud.positions.iter().copied().filter(|p| p.z < 2.4).collect();
-        let open = PointCloud { positions: open, ..PointCloud::default() };
-        assert_eq!(find_filled(&open), None);
+        let find_part = |is_seen: fn(&Vec3) -> bool| {
+            let seen = cloud.positions.iter().copied().filter(is_seen).collect();
+            find_filled(&PointCloud { positions: seen, ..PointCloud::default() })
+        };
+        let open = find_part(|p| p.z < 2.4).unwrap();
+        let above = camera_at(DVec3::new(3.0, 2.0, 20.0));
+        assert_eq!(open.planes_before(&above), [], "the walls are not cut");
+        assert_eq!(find_part(|p| p.z < 2.4 && p.x < 5.9), None);
+        assert_eq!(find_part(|p| 0.1 < p.z && p.z < 2.4), None);
+    }
+
+    #[test]
+    fn a_ball_is_no_room() {
         let ball = (0..20_000).map(|i| {
             let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
             let (sin, cos) = (2.399_963 * i as f32).sin_cos();
