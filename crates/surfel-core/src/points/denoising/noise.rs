@@ -11,6 +11,8 @@ use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
+/// Number of neighbours per squared spacing of noise at which the surface variation falls below [`MAX_PLANE_VARIATION`].
+const NEIGHBORS_PER_SQUARED_NOISE: f32 = 220.0;
 /// Number of points of a group, whose mean stands for them in large neighbourhoods.
 pub const GROUP_SIZE: usize = 8;
 /// Numbers of neighbours between which the noise is searched.
@@ -33,8 +35,13 @@ const N_REGIONS: usize = 256;
 const N_SAMPLES: usize = 16;
 /// Minimum fraction of them at which the noise can be told.
 const MIN_KNOWN: f32 = 0.25;
-/// Ratio of the third quartile of a region's noises to the median above which surfaces of different noise are mixed.
-const MIXED_RATIO: f32 = 2.0;
+/// Ratio of noises to the median of their region from which they are those of other surfaces, or of points that another
+/// scanner measured farther away.
+const OTHER_RATIO: f32 = 2.0;
+/// Minimum of such noises in spacings: with less, points lie in the surface rather than above it.
+const MIN_OTHER: f32 = 1.0;
+/// Minimum number of such noises in a region.
+const MIN_OTHERS: usize = 2;
 /// Minimum fraction of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
 const MIN_SURFACES: f32 = 0.8;
 /// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
@@ -45,9 +52,10 @@ const N_BLENDED_REGIONS: usize = 4;
 
 /// The noise by regions of a cloud.
 pub struct Noise {
-    /// Middles of the regions whose noise is known, and their noise in spacings.
+    /// Middles of the regions whose noise is known.
     centers: Vec<Vec3>,
-    noises: Vec<f32>,
+    /// Their noise in spacings.
+    noises: Vec<RegionNoise>,
     /// True for each point of a region that fills space, as leaves do.
     fills_space: Vec<bool>,
     /// Fraction of the samples whose noise is known.
@@ -101,7 +109,7 @@ impl Noise {
 
     /// Returns the noise that this fraction of the regions does not exceed.
     pub fn quantile(&self, fraction: f64) -> f32 {
-        quantile(self.noises.iter().copied(), fraction).unwrap_or(0.0)
+        quantile(self.noises.iter().map(|noise| noise.typical), fraction).unwrap_or(0.0)
     }
 
     /// True if the cloud is made of surfaces, not of leaves.
@@ -110,25 +118,60 @@ impl Noise {
     }
 
     /// Returns the noise at a position, interpolated between the nearest regions.
-    fn at(&self, centers: &KdTree, position: Vec3) -> f32 {
-        let (mut sum, mut weight) = (0.0, 0.0);
+    fn at(&self, centers: &KdTree, position: Vec3) -> RegionNoise {
+        let (mut typical, mut other, mut weight) = (0.0, 0.0, 0.0);
         for region in centers.nearest(position, N_BLENDED_REGIONS, None) {
             let nearness = 1.0 / region.distance_squared.max(f32::MIN_POSITIVE.sqrt());
-            sum += nearness * self.noises[region.index as usize];
+            let noise = self.noises[region.index as usize];
+            typical += nearness * noise.typical;
+            other += nearness * noise.other;
             weight += nearness;
         }
-        sum / weight
+        RegionNoise { typical: typical / weight, other: other / weight }
     }
 
     /// Returns the noise at each point in spacings, or none where points fill space.
     pub fn at_points(&self, points: &KdTree, progress: &dyn Progress) -> Result<Vec<Option<f32>>> {
         let centers = KdTree::new(&self.centers, progress)?;
-        let noise = |(position, fills_space): (&Vec3, &bool)| {
-            let is_known = !fills_space && !self.noises.is_empty();
-            is_known.then(|| self.at(&centers, *position))
+        let noise = |(point, fills_space): (usize, &bool)| {
+            progress.check()?;
+            if *fills_space || self.noises.is_empty() {
+                return Ok(None);
+            }
+            let noise = self.at(&centers, points.positions()[point]);
+            let is_other = noise.is_mixed() && is_noisier(points, point, noise.other);
+            Ok(Some(if is_other { noise.other } else { noise.typical }))
         };
-        Ok(points.positions().par_iter().zip(&self.fills_space).map(noise).collect())
+        self.fills_space.par_iter().enumerate().map(noise).collect()
     }
+}
+
+/// The noise of a region in spacings.
+#[derive(Clone, Copy)]
+struct RegionNoise {
+    /// The noise of most points.
+    typical: f32,
+    /// The noise of those with far more; the typical one if there are none.
+    other: f32,
+}
+
+impl RegionNoise {
+    fn is_mixed(&self) -> bool {
+        OTHER_RATIO * self.typical < self.other
+    }
+}
+
+/// True if a plane fits the neighbours of a point only if there are as many as a noise in spacings asks for.
+fn is_noisier(tree: &KdTree, point: usize, noise: f32) -> bool {
+    let positions = tree.positions();
+    let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
+    let n_neighbors = n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED);
+    let neighbors = tree.nearest(positions[point], n_neighbors, Some(point as u32));
+    let fits = |n: usize, max_variation: f32| {
+        let fit = fit_plane(positions, point, &neighbors[..n.min(neighbors.len())]);
+        fit.variation < max_variation
+    };
+    !fits(MIN_NOISE_NEIGHBORS, MAX_PLANE_VARIATION) && fits(n_neighbors, MAX_BENT_VARIATION)
 }
 
 /// Points near each other, some of which were asked for their noise.
@@ -171,15 +214,17 @@ impl Region {
         }
     }
 
-    /// Returns the noise if enough of the samples know it: the median, or the third quartile where surfaces of very
-    /// different noise lie upon each other.
-    fn noise(&self) -> Option<f32> {
+    /// Returns the noise if enough of the samples know it.
+    fn noise(&self) -> Option<RegionNoise> {
         if (self.noises.len() as f32) < MIN_KNOWN * self.n_samples as f32 {
             return None;
         }
-        let median = *self.noises.get(self.noises.len() / 2)?;
-        let third_quartile = self.noises[3 * self.noises.len() / 4];
-        Some(if MIXED_RATIO * median < third_quartile { third_quartile } else { median })
+        let typical = *self.noises.get(self.noises.len() / 2)?;
+        let min_other = MIN_OTHER.max(OTHER_RATIO * typical);
+        let n_typical = self.noises.partition_point(|noise| *noise < min_other);
+        let others = &self.noises[n_typical..];
+        let other = if others.len() < MIN_OTHERS { typical } else { others[others.len() / 2] };
+        Some(RegionNoise { typical, other })
     }
 
     fn fills_space(&self) -> bool {
