@@ -43,7 +43,7 @@ const MAX_HEIGHT: f32 = 6.0;
 /// The choice whether points are moved onto their surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Denoise {
-    /// Noisy surfaces without normals, and points on straight lines, are denoised.
+    /// Noisy surfaces without radii, and points on straight lines, are denoised.
     #[default]
     Auto,
     /// All points are moved.
@@ -98,7 +98,8 @@ pub fn denoise(
 ) -> Result<Option<Denoised>> {
     let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
     let is_auto = choice == Denoise::Auto;
-    if is_animated || choice == Denoise::Off || (is_auto && cloud.normals.is_some()) {
+    // Radii are those of a cloud that was prepared before.
+    if is_animated || choice == Denoise::Off || (is_auto && cloud.radii.is_some()) {
         return Ok(None);
     }
     let positions = &cloud.positions;
@@ -451,11 +452,13 @@ mod tests {
     }
 
     #[test]
-    fn clouds_with_normals_are_moved_only_if_asked() {
+    fn clouds_with_normals_are_moved_and_prepared_ones_only_if_asked() {
         let mut cloud = noisy_plane(0.5);
         cloud.normals = Some(vec![Vec3::Z; cloud.len()]);
-        assert_eq!(denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap(), None);
-        assert!(denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().is_some());
+        let mut prepared = PointCloud { radii: Some(vec![1.0; cloud.len()]), ..cloud.clone() };
+        assert!(denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().is_some());
+        assert_eq!(denoise(&mut prepared, Denoise::Auto, &NoProgress).unwrap(), None);
+        assert!(denoise(&mut prepared, Denoise::On, &NoProgress).unwrap().is_some());
         let mut animated = noisy_plane(0.5);
         animated.morphs =
             vec![Morph { positions: vec![Vec3::Z; animated.len()], ..Morph::default() }];

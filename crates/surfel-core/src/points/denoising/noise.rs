@@ -6,7 +6,7 @@
 use super::depth_steps::DepthSteps;
 use crate::error::Result;
 use crate::math::{Vec3, quantile};
-use crate::points::neighbors::KdTree;
+use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -161,17 +161,31 @@ impl RegionNoise {
     }
 }
 
-/// True if a plane fits the neighbours of a point only if there are as many as a noise in spacings asks for.
+/// True if a plane fits the neighbours of a point only if there are as many as a noise in spacings asks for, and the point
+/// is on no other surface.
 fn is_noisier(tree: &KdTree, point: usize, noise: f32) -> bool {
     let positions = tree.positions();
     let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
     let n_neighbors = n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED);
     let neighbors = tree.nearest(positions[point], n_neighbors, Some(point as u32));
-    let fits = |n: usize, max_variation: f32| {
-        let fit = fit_plane(positions, point, &neighbors[..n.min(neighbors.len())]);
-        fit.variation < max_variation
+    let nearest = &neighbors[..MIN_NOISE_NEIGHBORS.min(neighbors.len())];
+    if fit_plane(positions, point, nearest).variation < MAX_PLANE_VARIATION {
+        return false;
+    }
+    let fit = fit_plane(positions, point, &neighbors);
+    fit.variation < MAX_BENT_VARIATION && thins_out(positions, point, &neighbors, fit.normal)
+}
+
+/// True if there are no more points as high above the plane of the neighbours as a point than half as high: noise thins
+/// out with the height, another surface does not.
+fn thins_out(positions: &[Vec3], point: usize, neighbors: &[Neighbor], normal: Vec3) -> bool {
+    let heights = || neighbors.iter().map(|other| normal.dot(positions[other.index as usize]));
+    let level = heights().sum::<f32>() / neighbors.len() as f32;
+    let own = normal.dot(positions[point]) - level;
+    let n_within = |low: f32, high: f32| {
+        heights().filter(|height| (low..high).contains(&((height - level) / own))).count()
     };
-    !fits(MIN_NOISE_NEIGHBORS, MAX_PLANE_VARIATION) && fits(n_neighbors, MAX_BENT_VARIATION)
+    n_within(0.75, 1.25) <= n_within(0.25, 0.75)
 }
 
 /// Points near each other, some of which were asked for their noise.
@@ -291,5 +305,59 @@ impl NoiseAtPoint {
             k *= 2;
         }
         Self::FillsSpace
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Points of different noise on one plane.
+
+    use super::*;
+    use crate::math::{DVec3, Random};
+    use crate::progress::NoProgress;
+
+    const N_SIDE: usize = 100;
+
+    /// Returns points of a plane with a spacing of 1 and a noise of 0.2; `height` adds to every fourth.
+    fn plane(mut height: impl FnMut(&mut Random) -> f64) -> Vec<Vec3> {
+        let mut random = Random::new(5, 0);
+        let point = |i: usize| {
+            let added = if i.is_multiple_of(4) { height(&mut random) } else { 0.0 };
+            let z = added + 0.2 * random.next_gaussian();
+            let [x, y] =
+                [(i % N_SIDE) as f64, (i / N_SIDE) as f64].map(|at| at + random.next_f64());
+            DVec3::new(x, y, z).as_vec3()
+        };
+        (0..N_SIDE * N_SIDE).map(point).collect()
+    }
+
+    /// Returns the fraction of the points with a noise of more than a spacing.
+    fn noisy_fraction(points: &[Vec3], is_asked: impl Fn(&Vec3) -> bool) -> f64 {
+        let tree = KdTree::new(points, &NoProgress).unwrap();
+        let order = tree.order();
+        let noise = Noise::new(&tree, &tree, &order, None, &NoProgress).unwrap();
+        let noises = noise.at_points(&tree, &NoProgress).unwrap();
+        let asked = points.iter().zip(noises).filter(|(point, _)| is_asked(point));
+        let (n_asked, n_noisy) = asked.fold((0u32, 0usize), |(n_asked, n_noisy), (_, noise)| {
+            (n_asked + 1, n_noisy + usize::from(noise.is_some_and(|noise| 1.0 < noise)))
+        });
+        n_noisy as f64 / f64::from(n_asked)
+    }
+
+    #[test]
+    fn points_that_another_scanner_measured_farther_away_have_noise_of_their_own() {
+        let points = plane(|random| 4.0 * random.next_gaussian());
+        let fraction = |low: f32, high: f32| {
+            noisy_fraction(&points, |point| (low..high).contains(&point.z.abs()))
+        };
+        let (far, near) = (fraction(3.0, 8.0), fraction(0.0, 0.5));
+        assert!(0.7 < far && near < 0.5 * far, "{far} {near}");
+    }
+
+    #[test]
+    fn points_of_another_sheet_have_no_more_noise() {
+        let points = plane(|_| 8.0);
+        let fraction = noisy_fraction(&points, |point| 4.0 < point.z);
+        assert!(fraction < 0.02, "{fraction}");
     }
 }

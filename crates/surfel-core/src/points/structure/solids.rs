@@ -22,6 +22,10 @@ const BALL_REACH: f32 = 0.6;
 const MAX_SOLID_RATIO: f32 = 1.5;
 /// Minimum number of points of a structure for a typical radius of their own.
 const MIN_SOLIDS: usize = 16;
+/// Fraction of the points below which those of a structure may all be in places sampled far more densely than others.
+const FEW_SOLIDS: f32 = 0.05;
+/// Limit of the radii of so few, in typical radii of a surface.
+const FEW_SOLIDS_RADIUS: f32 = 0.5;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
 pub fn apply_structure(
@@ -104,7 +108,13 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
     let n_solids = solids.clone().count();
     let Some(median) = median(solids.map(|shape| shape.radius)) else { return };
     let limit = MAX_SOLID_RATIO * median;
-    let limit = if n_solids < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
+    let limit = match n_solids {
+        ..MIN_SOLIDS => limit.min(typical_radius),
+        n if typical_radius.is_finite() && (n as f32) < FEW_SOLIDS * shapes.len() as f32 => {
+            limit.max(FEW_SOLIDS_RADIUS * typical_radius)
+        }
+        _ => limit,
+    };
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
@@ -112,7 +122,7 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
 
 #[cfg(test)]
 mod tests {
-    //! Straight lines have the thickness that their points show.
+    //! The sizes of straight lines and of scattered points.
 
     use super::*;
     use crate::math::Random;
@@ -138,5 +148,21 @@ mod tests {
             let thickness = shape.radius / CAPSULE_ASPECT / THICKNESS;
             assert!((0.7..1.4).contains(&thickness), "{thickness}");
         }
+    }
+
+    #[test]
+    fn sparse_scattered_points_are_as_large_as_their_spacing_asks_for() {
+        let shape = |structure, radius| PointShape { structure, normal: Vec3::Z, radius };
+        let scattered = |n: usize, radius| vec![shape(Structure::Scatter, radius); n];
+        let surface = vec![shape(Structure::Surface, 0.1); 10_000];
+        let (dense, sparse) = (scattered(300, 0.004), scattered(100, 0.03));
+        let mut shapes = [dense, sparse, surface].concat();
+        clamp_solids(&mut shapes, Structure::Scatter, 0.1);
+        assert!(shapes[..300].iter().all(|shape| shape.radius == 0.004));
+        assert!(shapes[300..400].iter().all(|shape| shape.radius == 0.03));
+        // Most points of a forest are leaves, whose median tells how large they are.
+        shapes.truncate(1000);
+        clamp_solids(&mut shapes, Structure::Scatter, 0.1);
+        assert!(shapes[300..400].iter().all(|shape| shape.radius < 0.01));
     }
 }
