@@ -112,7 +112,7 @@ pub fn denoise(
     if is_auto && (noise.median() < MIN_NOISE || !noise.is_of_surfaces()) {
         return Ok(None);
     }
-    let noises = noise.at_points(&tree, progress)?;
+    let noises = noise.at_points(&tree, &groups, progress)?;
     drop(tree);
     // Neighbours near each other in memory make the moves 1.6 times as fast in clouds of random order.
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();

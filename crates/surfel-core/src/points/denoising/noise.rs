@@ -5,7 +5,7 @@
 
 use super::depth_steps::DepthSteps;
 use crate::error::Result;
-use crate::math::{Vec3, quantile};
+use crate::math::{Vec3, median, quantile};
 use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
@@ -38,6 +38,9 @@ const MIN_KNOWN: f32 = 0.25;
 /// Ratio of noises to the median of their region from which they are those of other surfaces, or of points that another
 /// scanner measured farther away.
 const OTHER_RATIO: f32 = 2.0;
+/// Ratio of the distance between neighbours to that of the region from which a point is asked for its own noise: regions of
+/// many points in a small place reach far where points are sparse.
+const SPARSE_RATIO: f32 = 2.0;
 /// Minimum of such noises in spacings: with less, points lie in the surface rather than above it.
 const MIN_OTHER: f32 = 1.0;
 /// Minimum number of such noises in a region.
@@ -119,19 +122,26 @@ impl Noise {
 
     /// Returns the noise at a position, interpolated between the nearest regions.
     fn at(&self, centers: &KdTree, position: Vec3) -> RegionNoise {
-        let (mut typical, mut other, mut weight) = (0.0, 0.0, 0.0);
+        let (mut typical, mut other, mut reach, mut weight) = (0.0, 0.0, 0.0, 0.0);
         for region in centers.nearest(position, N_BLENDED_REGIONS, None) {
             let nearness = 1.0 / region.distance_squared.max(f32::MIN_POSITIVE.sqrt());
             let noise = self.noises[region.index as usize];
             typical += nearness * noise.typical;
             other += nearness * noise.other;
+            reach += nearness * noise.reach;
             weight += nearness;
         }
-        RegionNoise { typical: typical / weight, other: other / weight }
+        RegionNoise { typical: typical / weight, other: other / weight, reach: reach / weight }
     }
 
     /// Returns the noise at each point in spacings, or none where points fill space.
-    pub fn at_points(&self, points: &KdTree, progress: &dyn Progress) -> Result<Vec<Option<f32>>> {
+    /// `groups` are those of [`Self::new`].
+    pub fn at_points(
+        &self,
+        points: &KdTree,
+        groups: &KdTree,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<f32>>> {
         let centers = KdTree::new(&self.centers, progress)?;
         let noise = |(point, fills_space): (usize, &bool)| {
             progress.check()?;
@@ -139,6 +149,12 @@ impl Noise {
                 return Ok(None);
             }
             let noise = self.at(&centers, points.positions()[point]);
+            if SPARSE_RATIO * noise.reach < reach_at(points, point as u32)
+                && let NoiseAtPoint::Known(own) = NoiseAtPoint::new(points, groups, point as u32)
+                && (own < MIN_OTHER || is_noisier(points, point, own))
+            {
+                return Ok(Some(own));
+            }
             let is_other = noise.is_mixed() && is_noisier(points, point, noise.other);
             Ok(Some(if is_other { noise.other } else { noise.typical }))
         };
@@ -153,12 +169,21 @@ struct RegionNoise {
     typical: f32,
     /// The noise of those with far more; the typical one if there are none.
     other: f32,
+    /// Distance from a point to the last of [`MIN_NOISE_NEIGHBORS`].
+    reach: f32,
 }
 
 impl RegionNoise {
     fn is_mixed(&self) -> bool {
         OTHER_RATIO * self.typical < self.other
     }
+}
+
+/// Returns the distance from a point to the last of [`MIN_NOISE_NEIGHBORS`].
+fn reach_at(tree: &KdTree, point: u32) -> f32 {
+    let neighbors =
+        tree.nearest(tree.positions()[point as usize], MIN_NOISE_NEIGHBORS, Some(point));
+    neighbors.last().map_or(0.0, |last| last.distance_squared.sqrt())
 }
 
 /// True if a plane fits the neighbours of a point only if there are as many as a noise in spacings asks for, and the point
@@ -197,6 +222,8 @@ struct Region {
     noises: Vec<f32>,
     /// Number of samples whose neighbours fill space.
     n_filled: usize,
+    /// Median distance from a sample to the last of [`MIN_NOISE_NEIGHBORS`].
+    reach: f32,
 }
 
 impl Region {
@@ -224,6 +251,8 @@ impl Region {
             center: sum / points.len() as f32,
             n_samples: samples.len(),
             n_filled: samples.iter().filter(fills).count(),
+            reach: median(points.iter().step_by(step).map(|point| reach_at(tree, *point)))
+                .unwrap_or_default(),
             noises,
         }
     }
@@ -238,7 +267,7 @@ impl Region {
         let n_typical = self.noises.partition_point(|noise| *noise < min_other);
         let others = &self.noises[n_typical..];
         let other = if others.len() < MIN_OTHERS { typical } else { others[others.len() / 2] };
-        Some(RegionNoise { typical, other })
+        Some(RegionNoise { typical, other, reach: self.reach })
     }
 
     fn fills_space(&self) -> bool {
@@ -251,9 +280,8 @@ impl Region {
 fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 {
     let Some(steps) = steps else { return 0.0 };
     let position = tree.positions()[point as usize];
-    let neighbors = tree.nearest(position, MIN_NOISE_NEIGHBORS, Some(point));
-    let reach = neighbors.last().map_or(0.0, |last| last.distance_squared);
-    let spacing = (std::f32::consts::PI * reach / MIN_NOISE_NEIGHBORS as f32).sqrt();
+    let reach = reach_at(tree, point);
+    let spacing = (std::f32::consts::PI / MIN_NOISE_NEIGHBORS as f32).sqrt() * reach;
     NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
 }
 
@@ -336,7 +364,7 @@ mod tests {
         let tree = KdTree::new(points, &NoProgress).unwrap();
         let order = tree.order();
         let noise = Noise::new(&tree, &tree, &order, None, &NoProgress).unwrap();
-        let noises = noise.at_points(&tree, &NoProgress).unwrap();
+        let noises = noise.at_points(&tree, &tree, &NoProgress).unwrap();
         let asked = points.iter().zip(noises).filter(|(point, _)| is_asked(point));
         let (n_asked, n_noisy) = asked.fold((0u32, 0usize), |(n_asked, n_noisy), (_, noise)| {
             (n_asked + 1, n_noisy + usize::from(noise.is_some_and(|noise| 1.0 < noise)))
