@@ -35,16 +35,16 @@ const N_REGIONS: usize = 256;
 const N_SAMPLES: usize = 16;
 /// Minimum fraction of them at which the noise can be told.
 const MIN_KNOWN: f32 = 0.25;
-/// Ratio of noises to the median of their region from which they are those of other surfaces, or of points that another
-/// scanner measured farther away.
+/// Ratio of noises to the median of their region from which they are those of points that another scanner measured farther
+/// away.
 const OTHER_RATIO: f32 = 2.0;
-/// Ratio of the distance between neighbours to that of the region from which a point is asked for its own noise: regions of
-/// many points in a small place reach far where points are sparse.
-const SPARSE_RATIO: f32 = 2.0;
 /// Minimum of such noises in spacings: with less, points lie in the surface rather than above it.
 const MIN_OTHER: f32 = 1.0;
 /// Minimum number of such noises in a region.
 const MIN_OTHERS: usize = 2;
+/// Ratio of the distance between neighbours to that of the region from which a point is asked for its own noise: regions of
+/// many points in a small place reach far where points are sparse.
+const SPARSE_RATIO: f32 = 2.0;
 /// Minimum fraction of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
 const MIN_SURFACES: f32 = 0.8;
 /// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
