@@ -59,8 +59,8 @@ enum Enclosure {
     WithCeiling,
 }
 
-/// Returns the room that a cloud shows, or `None` if its points cover neither a floor, a ceiling and three walls nor a floor and
-/// four walls.
+/// Returns the room that a cloud shows, or `None` if its points cover neither a floor, a ceiling and three walls nor a
+/// floor and four walls.
 pub fn find_room(cloud: &PointCloud, up: Vec3) -> Option<Room> {
     const MIN_POINTS: usize = 1000;
     let points = sample_inliers(cloud);
