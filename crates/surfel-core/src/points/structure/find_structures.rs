@@ -20,7 +20,7 @@ use super::vegetation::{is_vegetated, land_normal};
 use super::wall_faces::join_faces;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Aabb, Vec3};
 use crate::points::neighbors::{KdTree, Neighbor, Neighborhood};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::points::radii::radius::kth_distance;
@@ -98,8 +98,9 @@ pub fn find_structures(
     if is_land {
         open_see_through_discs(tree, radii, typical.radius, &mut shapes, progress)?;
     }
-    clamp_solids(&mut shapes, Structure::Line, typical.radius);
-    clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
+    let size = Aabb::of_points(positions.iter().copied()).diagonal();
+    clamp_solids(&mut shapes, Structure::Line, typical.radius, size);
+    clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size);
     limit_stray_points(tree, &mut shapes, progress)?;
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))
@@ -123,7 +124,8 @@ pub fn all_scattered(
         radius: ball_radius(*distance, *radius),
     };
     let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
-    clamp_solids(&mut shapes, Structure::Scatter, f32::INFINITY);
+    let size = Aabb::of_points(tree.positions().iter().copied()).diagonal();
+    clamp_solids(&mut shapes, Structure::Scatter, f32::INFINITY, size);
     let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
     Ok((shapes, report))
 }

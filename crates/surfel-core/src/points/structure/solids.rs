@@ -20,6 +20,9 @@ const THICKNESS_OF_DEVIATION: f32 = 1.4;
 const BALL_REACH: f32 = 0.6;
 /// Maximum ratio of the radius of a ball or capsule to the median of its structure.
 const MAX_SOLID_RATIO: f32 = 1.5;
+/// Maximum radius of a ball and half length of a capsule, in sizes of the cloud: views have a narrow margin around it.
+const MAX_BALL_PER_SIZE: f32 = 0.02;
+const MAX_CAPSULE_PER_SIZE: f32 = 0.08;
 /// Minimum number of points of a structure for a typical radius of their own.
 const MIN_SOLIDS: usize = 16;
 /// Fraction of the points below which those of a structure may all be in places sampled far more densely than others.
@@ -102,8 +105,17 @@ pub fn ball_radius(distance: f32, radius: f32) -> f32 {
 }
 
 /// Clamps the radii of stray points, which would be as large as the empty space around them. A few of them are no larger
-/// than the typical radius of a surface.
-pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_radius: f32) {
+/// than the typical radius of a surface. `size` is that of the cloud: the points of a few stay apart.
+pub fn clamp_solids(
+    shapes: &mut [PointShape],
+    structure: Structure,
+    typical_radius: f32,
+    size: f32,
+) {
+    let max_per_size = match structure {
+        Structure::Line => MAX_CAPSULE_PER_SIZE,
+        _ => MAX_BALL_PER_SIZE,
+    };
     let solids = shapes.iter().filter(|shape| shape.structure == structure);
     let n_solids = solids.clone().count();
     let Some(median) = median(solids.map(|shape| shape.radius)) else { return };
@@ -115,6 +127,8 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
         }
         _ => limit,
     };
+    // Equal points have no size.
+    let limit = if 0.0 < size { limit.min(max_per_size * size) } else { limit };
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
@@ -157,12 +171,22 @@ mod tests {
         let surface = vec![shape(Structure::Surface, 0.1); 10_000];
         let (dense, sparse) = (scattered(300, 0.004), scattered(100, 0.03));
         let mut shapes = [dense, sparse, surface].concat();
-        clamp_solids(&mut shapes, Structure::Scatter, 0.1);
+        clamp_solids(&mut shapes, Structure::Scatter, 0.1, 10.0);
         assert!(shapes[..300].iter().all(|shape| shape.radius == 0.004));
         assert!(shapes[300..400].iter().all(|shape| shape.radius == 0.03));
         // Most points of a forest are leaves, whose median tells how large they are.
         shapes.truncate(1000);
-        clamp_solids(&mut shapes, Structure::Scatter, 0.1);
+        clamp_solids(&mut shapes, Structure::Scatter, 0.1, 10.0);
         assert!(shapes[300..400].iter().all(|shape| shape.radius < 0.01));
+    }
+
+    #[test]
+    fn solids_of_few_points_are_small_beside_the_cloud() {
+        for structure in [Structure::Line, Structure::Scatter] {
+            let shape = PointShape { structure, normal: Vec3::Z, radius: 1.0 };
+            let mut shapes = vec![shape; 5];
+            clamp_solids(&mut shapes, structure, f32::INFINITY, 2.0);
+            assert!(shapes.iter().all(|shape| shape.radius < 0.4), "{shapes:?}");
+        }
     }
 }
