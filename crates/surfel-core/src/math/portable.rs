@@ -1,64 +1,61 @@
-//! Lanes without SIMD instructions.
+//! Lanes in the registers that every processor of the target has: SSE2, NEON or those of WebAssembly.
 
 use super::{DoubledLanes, Floats, LANES, LaneMask, Lanes, SimdTask, set_bits};
+use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+use wide::{f32x8, i32x8, u32x8};
 
-/// Eight floats in an array: the reference against which other implementations are tested.
+/// Eight floats, four to a register.
 #[derive(Clone, Copy, Debug)]
-pub struct PortableLanes([f32; LANES]);
+pub struct PortableLanes(f32x8);
 
-/// The mask of `PortableLanes`.
+/// The mask of `PortableLanes`: all bits of a lane are set, or none.
 #[derive(Clone, Copy, Debug)]
-pub struct PortableMask([bool; LANES]);
+pub struct PortableMask(f32x8);
 
-impl PortableLanes {
-    #[inline(always)]
-    fn map(self, other: Self, operation: impl Fn(f32, f32) -> f32) -> Self {
-        Self(std::array::from_fn(|i| operation(self.0[i], other.0[i])))
-    }
-}
+const LANE_INDICES: u32x8 = u32x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
 
 impl Floats for PortableLanes {
     type Mask = PortableMask;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Self([value; LANES])
+        Self(f32x8::splat(value))
     }
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.map(other, |a, b| if a < b { a } else { b })
+        Self::select(self.lt(other), self, other)
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.map(other, |a, b| if b < a { a } else { b })
+        Self::select(other.lt(self), self, other)
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(f32::sqrt))
+        Self(self.0.sqrt())
     }
 
     #[inline(always)]
     fn lt(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
+        PortableMask(self.0.simd_lt(other.0))
     }
 
     #[inline(always)]
     fn le(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
+        PortableMask(self.0.simd_le(other.0))
     }
 
     #[inline(always)]
     fn lt_u32(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
+        PortableMask(cast(cast::<_, u32x8>(self.0).simd_lt(cast::<_, u32x8>(other.0))))
     }
 
     #[inline(always)]
     fn select(mask: PortableMask, if_true: Self, if_false: Self) -> Self {
-        Self(std::array::from_fn(|i| if mask.0[i] { if_true.0[i] } else { if_false.0[i] }))
+        Self(mask.0.bitselect(if_true.0, if_false.0))
     }
 }
 
@@ -82,64 +79,67 @@ impl Lanes for PortableLanes {
 
     #[inline(always)]
     fn load(values: &[f32; LANES]) -> Self {
-        Self(*values)
+        Self(f32x8::new(*values))
     }
 
     #[inline(always)]
     fn from_u8(values: &[u8; LANES]) -> Self {
-        Self(values.map(f32::from))
+        Self(i32x8::new(values.map(i32::from)).round_float())
     }
 
     #[inline(always)]
     fn from_u16(values: &[u16; LANES]) -> Self {
-        Self(values.map(f32::from))
+        Self(i32x8::new(values.map(i32::from)).round_float())
     }
 
     #[inline(always)]
     fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self {
-        Self(words.map(|word| ((word << (22 - SHIFT)) as i32 >> 22) as f32))
+        let top = u32x8::new(*words) << (22 - SHIFT) as u32;
+        Self((cast::<_, i32x8>(top) >> 22_u32).round_float())
     }
 
     #[inline(always)]
     fn from_top_bits(words: &[u32; LANES]) -> Self {
-        Self(words.map(|word| (word >> 30) as f32))
+        Self(cast::<_, i32x8>(u32x8::new(*words) >> 30_u32).round_float())
     }
 
     #[inline(always)]
     fn store(self) -> [f32; LANES] {
-        self.0
+        self.0.to_array()
     }
 
     #[inline(always)]
     fn reduce_max(self) -> f32 {
-        self.0.into_iter().fold(f32::NEG_INFINITY, f32::max)
+        self.store().into_iter().fold(f32::NEG_INFINITY, f32::max)
     }
 
     #[inline(always)]
     fn packed_indices(lanes: PortableMask, first: u32, other: u32) -> Self {
-        let word = |i: usize| if lanes.0[i] { first } else { other }.wrapping_add(i as u32);
-        Self(std::array::from_fn(|i| f32::from_bits(word(i))))
+        let [first, other] = [first, other].map(|word| Self::splat(f32::from_bits(word)));
+        Self(cast(cast::<_, u32x8>(Self::select(lanes, first, other).0) + LANE_INDICES))
     }
 
     #[inline(always)]
-    fn rotate_lanes<const BY: usize>(mut self) -> Self {
-        self.0.rotate_left(BY);
-        self
+    fn rotate_lanes<const BY: usize>(self) -> Self {
+        let mut values = self.store();
+        values.rotate_left(BY);
+        Self::load(&values)
     }
 
     #[inline(always)]
     fn compress(self, lanes: PortableMask) -> Self {
-        let mut values = [0.0; LANES];
+        let (from, mut values) = (self.store(), [0.0; LANES]);
         for (value, lane) in values.iter_mut().zip(set_bits::<LANES>(lanes.bits())) {
-            *value = self.0[lane];
+            *value = from[lane];
         }
-        Self(values)
+        Self::load(&values)
     }
 
     #[inline(always)]
     fn sort_descending(self, lanes: PortableMask, others: Self) -> (Self, Self) {
-        let order = descending_order(self.0, lanes.bits());
-        (Self(order.map(|lane| self.0[lane])), Self(order.map(|lane| others.0[lane])))
+        let (keys, others) = (self.store(), others.store());
+        let order = descending_order(keys, lanes.bits());
+        (Self::load(&order.map(|lane| keys[lane])), Self::load(&order.map(|lane| others[lane])))
     }
 
     #[inline(always)]
@@ -154,8 +154,7 @@ impl Lanes for PortableLanes {
 
     #[inline(always)]
     fn first_lanes<const SHIFT: i32>(word: u32) -> PortableMask {
-        let n = (word >> SHIFT & 0xf) as usize;
-        PortableMask(std::array::from_fn(|lane| lane < n))
+        PortableMask(cast(LANE_INDICES.simd_lt(u32x8::splat(word >> SHIFT & 0xf))))
     }
 
     #[inline(always)]
@@ -179,7 +178,7 @@ macro_rules! portable_operator {
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.map(other, |a, b| a $operator b)
+                Self(self.0 $operator other.0)
             }
         }
     };
@@ -193,7 +192,7 @@ portable_operator!(Div, div, /);
 impl LaneMask for PortableMask {
     #[inline(always)]
     fn bits(self) -> u32 {
-        self.0.iter().enumerate().fold(0, |bits, (i, &set)| bits | u32::from(set) << i)
+        self.0.to_bitmask()
     }
 }
 
@@ -202,7 +201,7 @@ impl BitAnd for PortableMask {
 
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] & other.0[i]))
+        Self(self.0 & other.0)
     }
 }
 
@@ -211,6 +210,6 @@ impl BitOr for PortableMask {
 
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] | other.0[i]))
+        Self(self.0 | other.0)
     }
 }

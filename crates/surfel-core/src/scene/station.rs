@@ -34,6 +34,9 @@ const MAX_SPREAD_WITHIN_CELLS: f64 = 0.7;
 /// Maximum fraction of the points that lie behind others: a scanner does not see through surfaces. Scans had 0.02 to 0.03,
 /// an object whose zero lies within it 0.4.
 const MAX_BEHIND: f64 = 0.25;
+/// Minimum fraction of the normals that face a scanner: it measures no surface from behind. Half of the normals do if their
+/// signs mean nothing, and 0.15 of those of an object about its zero.
+const MIN_FACING: f64 = 0.33;
 /// Horizontal angle that should have most of the far points: that of a picture of 16:9.
 const WINDOW_DEG: usize = 90;
 /// Vertical angle of view in degrees: wider than for objects, as things all around are near.
@@ -57,6 +60,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let points = polar_points(scanner, &points, up);
     let [near, median, far] = distances(&points)?;
     let is_scan = MIN_DISTANCE_RATIO * near <= far
+        && MIN_FACING <= facing_fraction(cloud, scanner)
         && MIN_SECTORS <= n_filled_sectors(&points)
         && density_slope(&points)? < MAX_DENSITY_SLOPE
         && spread_within_cells(&points) < MAX_SPREAD_WITHIN_CELLS
@@ -149,6 +153,15 @@ fn n_filled_sectors(points: &[PolarPoint]) -> usize {
     }
     let min_count = MIN_SECTOR_FRACTION * points.len() as f64;
     counts.into_iter().filter(|count| min_count <= *count as f64).count()
+}
+
+/// Returns the fraction of the normals of `cloud` that face `scanner`, or 1 if it has none.
+fn facing_fraction(cloud: &PointCloud, scanner: Vec3) -> f64 {
+    let Some(normals) = &cloud.normals else { return 1.0 };
+    let toward = |i: usize| normals[i].dot(scanner - cloud.positions[i]);
+    let (facing, other): (Vec<f32>, Vec<f32>) =
+        sample_indices(cloud).map(toward).filter(|cosine| *cosine != 0.0).partition(|c| 0.0 < *c);
+    facing.len() as f64 / (facing.len() + other.len()).max(1) as f64
 }
 
 /// Returns the horizontal direction about which most points lie beyond `distance`.
@@ -352,6 +365,18 @@ mod tests {
         }));
         let object = PointCloud::from_positions(points);
         assert_eq!(find_station(&object, Vec3::Z), None);
+    }
+
+    #[test]
+    fn a_surface_that_is_seen_from_behind_has_no_station() {
+        let mut cloud = street_sweep(0.0);
+        let toward_zero = |position: &Vec3| -position.normalize();
+        cloud.normals = Some(cloud.positions.iter().map(toward_zero).collect());
+        assert!(find_station(&cloud, Vec3::Z).is_some());
+        for normal in cloud.normals.iter_mut().flatten() {
+            *normal = -*normal;
+        }
+        assert_eq!(find_station(&cloud, Vec3::Z), None);
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub struct CleanReport {
     pub n_points_before: usize,
     /// Number of points dropped because their position is not finite or beyond 1e15 from the cloud's origin.
     pub n_invalid_positions: usize,
+    /// Number of points dropped because they lie at exactly zero, where scanners write rays that measured nothing.
+    pub n_unmeasured: usize,
     /// Number of points dropped because they are of a class of noise.
     pub n_noise: usize,
     /// Number of points dropped because they are flagged withheld.
@@ -45,10 +47,13 @@ const MIN_DUPLICATE_COSINE: f32 = 0.85;
 /// Maximum number of points at one position that are compared with each other.
 const MAX_COMPARED: usize = 64;
 
+/// Minimum number of points at exactly zero at which they are rays that measured nothing.
+const MIN_UNMEASURED: usize = 10;
+
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, those of classes of noise other than `kept_noise` and those flagged withheld unless
+/// Drops points with invalid positions, those of rays that measured nothing, those of classes of noise other than `kept_noise` and those flagged withheld unless
 /// there are no others, and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms
 /// are kept, as they may part at another time; so are those of trained Gaussians, which may have different sizes and
 /// colours.
@@ -80,6 +85,7 @@ impl CleanReport {
     fn lines(&self) -> Vec<String> {
         let counts = [
             (self.n_invalid_positions, "point", "dropped: no position, or beyond 1e15"),
+            (self.n_unmeasured, "point", "dropped: at exactly 0, 0, 0, where nothing was measured"),
             (self.n_noise, "point", "dropped: classes of noise (7, 18)"),
             (self.n_withheld, "point", "dropped: flagged withheld"),
             (self.n_duplicates, "point", "dropped: at exactly the position of another"),
@@ -106,22 +112,26 @@ fn find_dropped(
         return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
     }
     progress.check()?;
-    let is_invalid = |i: u32| !is_valid_position(positions[i as usize]);
+    let unmeasured = unmeasured_position(cloud);
+    let is_unmeasured = |i: u32| unmeasured == Some(positions[i as usize]);
+    let is_invalid = |i: u32| !is_valid_position(positions[i as usize]) || is_unmeasured(i);
     let is_noise = |class: &u8| NOISE_CLASSES.contains(class) && !kept_noise.contains(class);
     let noise = cloud.classification.as_deref().filter(|classes| !classes.iter().all(is_noise));
     let is_noise = |i: u32| noise.is_some_and(|classes| is_noise(&classes[i as usize]));
     let indices = 0..positions.len() as u32;
     let mut dropped: Vec<u32> = indices.into_par_iter().filter(|i| is_invalid(*i)).collect();
-    report.n_invalid_positions = dropped.len();
+    let n_dropped = dropped.len();
+    report.n_unmeasured = dropped.par_iter().filter(|i| is_unmeasured(**i)).count();
+    report.n_invalid_positions = n_dropped - report.n_unmeasured;
     let indices = 0..positions.len() as u32;
     dropped.par_extend(indices.into_par_iter().filter(|i| !is_invalid(*i) && is_noise(*i)));
-    report.n_noise = dropped.len() - report.n_invalid_positions;
+    report.n_noise = dropped.len() - n_dropped;
     let withheld = withheld_points(cloud, |i| !is_invalid(i) && !is_noise(i));
     let is_withheld = |i: u32| withheld.is_some_and(|flags| flags.get(i as usize) != 0.0);
     let indices = 0..positions.len() as u32;
     let is_unseen = |i: &u32| !is_invalid(*i) && !is_noise(*i) && is_withheld(*i);
     dropped.par_extend(indices.into_par_iter().filter(is_unseen));
-    report.n_withheld = dropped.len() - report.n_invalid_positions - report.n_noise;
+    report.n_withheld = dropped.len() - n_dropped - report.n_noise;
     let n_dropped = dropped.len();
     let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
     if !may_part && !cloud.has_gaussians() {
@@ -142,6 +152,13 @@ fn find_dropped(
     report.n_duplicates = dropped.len() - n_dropped;
     dropped.par_sort_unstable();
     Ok(dropped)
+}
+
+/// Returns the position of rays that measured nothing, which is the zero of the file, if there are such rays.
+fn unmeasured_position(cloud: &PointCloud) -> Option<Vec3> {
+    let zero = (-cloud.origin).as_vec3();
+    let n_at_zero = cloud.positions.par_iter().filter(|position| **position == zero).count();
+    (MIN_UNMEASURED..cloud.len()).contains(&n_at_zero).then_some(zero)
 }
 
 /// Returns the withheld flags, unless all points that would stay are withheld.
@@ -250,7 +267,7 @@ mod tests {
     //! Dropped points and marked entries.
 
     use super::*;
-    use crate::math::Random;
+    use crate::math::{DVec3, Random};
     use crate::points::Scalar;
     use crate::progress::NoProgress;
 
@@ -275,6 +292,24 @@ mod tests {
         let (cloud, report) = clean(cloud, Duplicates::Keep, &[], &NoProgress).unwrap();
         assert_eq!(cloud.positions, positions[..3]);
         assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, 0));
+    }
+
+    #[test]
+    fn rays_that_measured_nothing_are_dropped() {
+        let mut positions = vec![Vec3::ZERO; MIN_UNMEASURED];
+        let all_equal = PointCloud::from_positions(positions.clone());
+        positions.push(Vec3::X);
+        let with_one = PointCloud::from_positions(positions);
+        let (cloud, report) = cleaned(with_one.clone());
+        assert_eq!((cloud.positions, report.n_unmeasured), (vec![Vec3::X], MIN_UNMEASURED));
+        assert_eq!((report.n_invalid_positions, report.n_duplicates), (0, 0));
+        let mut elsewhere = with_one.clone();
+        elsewhere.origin = DVec3::X;
+        let mut at_the_zero_of_its_file = with_one;
+        at_the_zero_of_its_file.rebase(DVec3::new(100.0, 20.0, 0.0));
+        assert_eq!(cleaned(elsewhere).1.n_duplicates, MIN_UNMEASURED - 1);
+        assert_eq!(cleaned(at_the_zero_of_its_file).1.n_unmeasured, MIN_UNMEASURED);
+        assert_eq!(cleaned(all_equal).0.len(), 1);
     }
 
     #[test]
