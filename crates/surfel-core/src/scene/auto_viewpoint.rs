@@ -9,6 +9,9 @@ use crate::math::{DQuat, DVec3, Vec3};
 
 /// Azimuth of the viewpoint if no other is clearly better: south, a little to the east.
 const FRONT_AZIMUTH_DEG: f64 = 155.0;
+/// Viewpoint above an object that was scanned from there: north is up in the picture.
+const ABOVE_AZIMUTH_DEG: f64 = 180.0;
+const ABOVE_ELEVATION_DEG: f64 = 80.0;
 /// Height over width from which an object counts as upright: it has a front and a back.
 const MIN_UPRIGHT_FLATNESS: f64 = 0.6;
 /// Height over width below which a cloud counts as terrain.
@@ -17,9 +20,9 @@ const MAX_TERRAIN_FLATNESS: f64 = 0.25;
 /// Returns the direction of view toward `points`: the flatter the cloud, the higher the viewpoint.
 ///
 /// Terrain has no front, so it is viewed from where it fills the picture best, and along its length if it is a corridor.
-/// Anything else is viewed from
-/// the side from which most points are visible. Objects that are visible equally well from all sides are viewed
-/// from the side that models face by convention, or from behind it if that side has more relief.
+/// Anything else is viewed from the side from which most points are visible, or from above if it was scanned from there.
+/// Objects that are visible equally well from all sides are viewed from the side that models face by convention, or from
+/// behind it if that side has more relief.
 pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     let (east, north) = ground_axes(fit.up);
     let extent = |axis: Vec3| {
@@ -29,12 +32,19 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     let flatness = f64::from(extent(fit.up) / extent(east).max(extent(north)).max(1e-9));
     let elevation_deg =
         fit.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
-    let azimuth_deg = if flatness < MAX_TERRAIN_FLATNESS {
-        best_fit_azimuth_deg(points, elevation_deg, fit)
+    let (azimuth_deg, elevation_deg) = if flatness < MAX_TERRAIN_FLATNESS {
+        (best_fit_azimuth_deg(points, elevation_deg, fit), elevation_deg)
     } else {
-        match most_visible_azimuth_deg(points, elevation_deg, fit) {
-            FRONT_AZIMUTH_DEG if MIN_UPRIGHT_FLATNESS <= flatness => front_azimuth_deg(points, fit),
-            azimuth_deg => azimuth_deg,
+        let azimuth_deg = most_visible_azimuth_deg(points, elevation_deg, fit);
+        let is_front = azimuth_deg == FRONT_AZIMUTH_DEG && MIN_UPRIGHT_FLATNESS <= flatness;
+        let from_side =
+            (if is_front { front_azimuth_deg(points, fit) } else { azimuth_deg }, elevation_deg);
+        let from_above = (ABOVE_AZIMUTH_DEG, ABOVE_ELEVATION_DEG);
+        let is_open = fit.elevation_deg.is_none() && !fit.is_turntable;
+        if is_open && is_scan_from(from_above, from_side, points, fit) {
+            from_above
+        } else {
+            from_side
         }
     };
     let across = direction_from(azimuth_deg, elevation_deg, fit.up);
@@ -42,6 +52,17 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     // Azimuths count clockwise seen from above.
     let turn = DQuat::from_axis_angle(fit.up.as_dvec3(), -fit.azimuth_deg.to_radians());
     turn * along.unwrap_or(across)
+}
+
+/// True if nearly all points are visible from azimuth and elevation `seen_from`, and clearly more than from `side`: those of
+/// a scan from one side.
+fn is_scan_from(seen_from: (f64, f64), side: (f64, f64), points: &[Vec3], fit: &CameraFit) -> bool {
+    /// Fraction of the points that is visible from where a scan was made: edges hide some.
+    const MIN_VISIBLE: f64 = 0.9;
+    /// Minimum gain over the view from the side, from which objects are usually looked at.
+    const MIN_GAIN: f64 = 0.15;
+    let fraction = visible_from(seen_from, points, fit);
+    MIN_VISIBLE < fraction && visible_from(side, points, fit) + MIN_GAIN < fraction
 }
 
 /// Returns the azimuth in the south from which the nearest camera shows the whole cloud.
@@ -66,10 +87,7 @@ fn best_fit_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) ->
 fn most_visible_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) -> f64 {
     /// Another azimuth must show this much more than the front: closed objects look alike from all sides.
     const MIN_GAIN: f64 = 0.1;
-    let visible = |azimuth_deg: f64| {
-        let forward = direction_from(azimuth_deg, elevation_deg, fit.up);
-        visible_fraction(points, &fit_along(forward, points, fit), fit.aspect)
-    };
+    let visible = |azimuth_deg: f64| visible_from((azimuth_deg, elevation_deg), points, fit);
     let azimuths = (1..12).map(|step| FRONT_AZIMUTH_DEG + 30.0 * f64::from(step));
     let fractions = azimuths.map(|azimuth_deg| (visible(azimuth_deg), azimuth_deg));
     let best = fractions.max_by(|a, b| a.0.total_cmp(&b.0));
@@ -133,6 +151,12 @@ fn relief(points: &[Vec3], azimuth_deg: f64, up: Vec3) -> f64 {
         (sum + f64::from(laplacian.abs().min(MAX_UNEVENNESS)), count + 1)
     });
     sum / count.max(1) as f64
+}
+
+/// Returns the fraction of the points that are visible from this azimuth and elevation.
+fn visible_from((azimuth_deg, elevation_deg): (f64, f64), points: &[Vec3], fit: &CameraFit) -> f64 {
+    let forward = direction_from(azimuth_deg, elevation_deg, fit.up);
+    visible_fraction(points, &fit_along(forward, points, fit), fit.aspect)
 }
 
 /// Returns the fraction of the points that no other point hides in a small picture.
@@ -215,6 +239,22 @@ mod tests {
             let forward = automatic_direction(&column.collect::<Vec<Vec3>>(), &fit);
             assert!(forward.dot(toward.as_dvec3()) < -0.5, "{toward}: {forward}");
         }
+    }
+
+    #[test]
+    fn an_object_scanned_from_above_is_viewed_from_there() {
+        // The upper half of a ball, and the whole ball.
+        let ball = (0..20_000).map(|i| {
+            let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        });
+        let ball: Vec<Vec3> = ball.collect();
+        let fit = CameraFit { up: Vec3::Z, ..CameraFit::default() };
+        let down = |points: &[Vec3]| -automatic_direction(points, &fit).z;
+        let upper = down(&ball[..10_000]);
+        let whole = down(&ball);
+        assert!(0.95 < upper && whole < 0.4, "{upper} {whole}");
     }
 
     #[test]
