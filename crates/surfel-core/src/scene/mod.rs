@@ -26,6 +26,7 @@ mod interior;
 mod direction_cells;
 mod station;
 mod sunlit;
+mod visible_normals;
 mod validate;
 pub mod color;
 
@@ -51,6 +52,7 @@ pub use station::{find_depth_camera, find_station, view_from_station};
 pub use sunlit::sunlit_fraction;
 pub use texture::{Texture, TextureEncoding, TextureRef, Wrap};
 pub use tunnel::find_tunnel;
+pub use visible_normals::visible_normals;
 
 pub use crate::points::{Morph, Skin};
 

@@ -56,7 +56,7 @@ use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::stand_at_station;
-use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
+use sun_and_sky::{LightingContext, choose_lights, lights};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
@@ -167,10 +167,16 @@ impl AutoSettings {
         };
         let is_inside = matches!(inside, Some(Inside::Tunnel(_)))
             || found_room.is_some_and(|room| room.contains(camera.camera.position));
-        let scan = view.map(|view| ScanInView { points: &points, view });
         let has_normals = scene.has_normals(description);
-        let context =
-            LightingContext { camera: camera.camera, up, diagonal, is_inside, has_normals, scan };
+        let context = LightingContext {
+            camera: camera.camera,
+            up,
+            diagonal,
+            is_inside,
+            has_normals,
+            points: &points,
+            inside: view,
+        };
         let mut description = choose_lights(description, &context, progress);
         choose_point_size(scene, &mut description, &points, &camera.camera, progress);
         let lights = lights(&description, scene.environment.as_ref(), up, has_normals)?;

@@ -3,10 +3,12 @@
 use crate::description::{KeyedSettings, LightKind, SceneDescription, SkySettings, SunSettings};
 use crate::error::Result;
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
-use surfel_core::math::Vec3;
+use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Camera, Environment, InsideView, Light, Sky, Sun, sunlit_fraction};
+use surfel_core::scene::{
+    Camera, Environment, InsideView, Light, Sky, Sun, sunlit_fraction, visible_normals,
+};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::words::format_length;
 
@@ -18,8 +20,11 @@ const SKY_COLOR: Vec3 = Vec3::new(0.325, 0.355, 0.405);
 /// Light that the ground reflects: a third of what it receives, coloured by stone and soil.
 const GROUND_COLOR: Vec3 = Vec3::new(0.16, 0.145, 0.125);
 
-/// Degrees by which the sun stands to the left of straight behind the camera: shadows show, but do not dominate.
+/// Degrees by which the sun stands to the left or right of straight behind the camera: shadows show, but do not dominate.
 const SUN_OFFSET_DEG: f64 = 60.0;
+
+/// Minimum ratio of the light that a sun on the right gives to that of one on the left, at which it stands on the right.
+const MIN_GAIN_ON_RIGHT: f32 = 1.15;
 
 /// Fraction of the scene's diagonal up to which things darken the sky.
 const AO_FRACTION: f32 = 0.15;
@@ -43,16 +48,10 @@ pub struct LightingContext<'a> {
     pub is_inside: bool,
     /// True if points have normals of their own.
     pub has_normals: bool,
-    /// The scan that is shown from within.
-    pub scan: Option<ScanInView<'a>>,
-}
-
-/// A scan that is shown from within.
-pub struct ScanInView<'a> {
-    /// The points of the scan.
+    /// The points of the scene, or a sample of them.
     pub points: &'a PointCloud,
-    /// The view from within.
-    pub view: &'a InsideView,
+    /// The view, if the points are a scan that is shown from within.
+    pub inside: Option<&'a InsideView>,
 }
 
 /// Returns the description with everything written into it that it leaves open about the lights of the whole scene.
@@ -95,7 +94,7 @@ pub fn choose_lights(
 /// Returns true if the sun at its automatic place would reach hardly anything of what is shown from within a scan, as
 /// under a roof.
 fn is_sun_hidden(context: &LightingContext) -> bool {
-    let Some(ScanInView { points, view }) = &context.scan else { return false };
+    let LightingContext { points, inside: Some(view), .. } = context else { return false };
     let azimuth_deg = automatic_azimuth_deg(context) as f32;
     let elevation_deg = SunSettings::default().elevation() as f32;
     let to_sun = Sun::direction_from_angles(azimuth_deg, elevation_deg, context.up);
@@ -207,17 +206,37 @@ fn sky(settings: &SkySettings, up: Vec3) -> Sky {
     Sky { up, zenith, ground, ao_distance }
 }
 
-/// Behind the camera and to its left; from the upper left of a map, as cartographers shade hills.
+/// Behind the camera and to its left, or to its right if what the camera shows is brighter then; from the upper left of a
+/// map, as cartographers shade hills.
 fn automatic_azimuth_deg(context: &LightingContext) -> f64 {
     let [_, camera_up, forward] = context.camera.axes();
-    let up = context.up.as_dvec3();
-    let looks_down = forward.dot(up) < -0.8;
-    let (ahead, turn_deg) =
-        if looks_down { (camera_up, -45.0) } else { (forward, 180.0 + SUN_OFFSET_DEG) };
-    let north = Sun::direction_from_angles(0.0, 0.0, context.up).as_dvec3();
-    let east = Sun::direction_from_angles(90.0, 0.0, context.up).as_dvec3();
-    let ahead_deg = ahead.dot(east).atan2(ahead.dot(north)).to_degrees();
-    (ahead_deg + turn_deg).rem_euclid(360.0)
+    let azimuth_deg = |ahead: DVec3, turn_deg: f64| {
+        let north = Sun::direction_from_angles(0.0, 0.0, context.up).as_dvec3();
+        let east = Sun::direction_from_angles(90.0, 0.0, context.up).as_dvec3();
+        let ahead_deg = ahead.dot(east).atan2(ahead.dot(north)).to_degrees();
+        (ahead_deg + turn_deg).rem_euclid(360.0)
+    };
+    if forward.dot(context.up.as_dvec3()) < -0.8 {
+        return azimuth_deg(camera_up, -45.0);
+    }
+    let [left, right] =
+        [SUN_OFFSET_DEG, -SUN_OFFSET_DEG].map(|turn| azimuth_deg(forward, 180.0 + turn));
+    if context.inside.is_some() {
+        return left;
+    }
+    let origin = context.points.origin;
+    let camera = Camera {
+        position: context.camera.position - origin,
+        focal_point: context.camera.focal_point - origin,
+        ..context.camera
+    };
+    let normals = visible_normals(&context.points.positions, &camera);
+    let light_from = |azimuth_deg: f64| {
+        let elevation_deg = SunSettings::default().elevation() as f32;
+        let to_sun = Sun::direction_from_angles(azimuth_deg as f32, elevation_deg, context.up);
+        normals.iter().map(|normal| normal.dot(to_sun).max(0.0)).sum::<f32>()
+    };
+    if MIN_GAIN_ON_RIGHT * light_from(left) < light_from(right) { right } else { left }
 }
 
 #[cfg(test)]
@@ -225,11 +244,10 @@ mod tests {
     //! The direction of the sun, where it does not shine, and the brightness of level ground.
 
     use super::*;
-    use surfel_core::math::DVec3;
     use surfel_core::progress::NoProgress;
     use surfel_core::scene::Projection;
 
-    fn context(forward: DVec3) -> LightingContext<'static> {
+    fn context(forward: DVec3, points: &PointCloud) -> LightingContext<'_> {
         let camera = Camera {
             position: -forward,
             focal_point: DVec3::ZERO,
@@ -242,15 +260,40 @@ mod tests {
             diagonal: 1.0,
             is_inside: false,
             has_normals: false,
-            scan: None,
+            points,
+            inside: None,
         }
     }
 
     #[test]
     fn the_sun_is_behind_the_camera_or_at_the_upper_left_of_a_map() {
-        assert!((automatic_azimuth_deg(&context(DVec3::Y)) - 240.0).abs() < 1e-4);
-        assert!((automatic_azimuth_deg(&context(DVec3::X)) - 330.0).abs() < 1e-4);
-        assert!((automatic_azimuth_deg(&context(-DVec3::Z)) - 315.0).abs() < 1e-4);
+        let none = PointCloud::default();
+        let azimuth_deg = |forward: DVec3| automatic_azimuth_deg(&context(forward, &none));
+        assert!((azimuth_deg(DVec3::Y) - 240.0).abs() < 1e-4);
+        assert!((azimuth_deg(DVec3::X) - 330.0).abs() < 1e-4);
+        assert!((azimuth_deg(-DVec3::Z) - 315.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_sun_is_on_the_side_from_which_a_wall_is_lit() {
+        // A wall before a camera that looks north. It faces south, turned counterclockwise seen from above.
+        let azimuth_deg = |turn_deg: f32| {
+            let (sin, cos) = turn_deg.to_radians().sin_cos();
+            let point = |i: usize| {
+                let along = (i % 200) as f32 / 200.0 - 0.5;
+                Vec3::new(cos * along, sin * along, (i / 200) as f32 / 200.0 - 0.5)
+            };
+            let mut wall = PointCloud::from_positions((0..40_000).map(point).collect());
+            wall.origin = DVec3::new(5e5, 4e6, 100.0);
+            let camera = context(3.0 * DVec3::Y, &wall).camera;
+            let camera = Camera {
+                position: wall.origin + camera.position,
+                focal_point: wall.origin,
+                ..camera
+            };
+            automatic_azimuth_deg(&LightingContext { camera, ..context(DVec3::Y, &wall) }).round()
+        };
+        assert_eq!([-50.0, 0.0, 50.0].map(azimuth_deg), [240.0, 240.0, 120.0]);
     }
 
     /// Returns what a scanner 1.5 m under a ceiling and 2 m above a floor measures, or without the ceiling.
@@ -278,8 +321,7 @@ mod tests {
                 distance: 4.0,
                 view_angle_deg: 60.0,
             };
-            let scan = Some(ScanInView { points: &points, view: &view });
-            let context = LightingContext { scan, ..context(DVec3::Y) };
+            let context = LightingContext { inside: Some(&view), ..context(DVec3::Y, &points) };
             let mut description = SceneDescription::default();
             description.sun.azimuth = azimuth;
             let chosen = choose_lights(&description, &context, &NoProgress);

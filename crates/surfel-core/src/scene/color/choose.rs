@@ -11,29 +11,31 @@ use rayon::prelude::*;
 const DEFAULT_COLOR: [u8; 3] = [0xd6, 0xd2, 0xca];
 
 /// Returns the source of colours that suits `cloud`, and the reason for the choice.
-pub fn choose_source(cloud: &PointCloud) -> (ColorSource, &'static str) {
-    if cloud.colors.as_ref().is_some_and(|colors| are_measured(colors)) {
-        return (ColorSource::Rgb, "the colours of the file");
-    }
+pub fn choose_source(cloud: &PointCloud) -> (ColorSource, String) {
+    let colors = match &cloud.colors {
+        Some(colors) if are_measured(colors) => {
+            return (ColorSource::Rgb, "the colours of the file".into());
+        }
+        Some(_) => "most colours in the file are black, or all white",
+        None => "no colours in the file",
+    };
     if is_terrain(cloud) {
-        return (ColorSource::Elevation, "no colours in the file; wide, flat and georeferenced");
+        return (ColorSource::Elevation, format!("{colors}; wide, flat and georeferenced"));
     }
+    let constant = ColorSource::Constant(DEFAULT_COLOR);
     match &cloud.intensity {
         Some(values) if shows_surface(&cloud.positions, values) => {
-            (ColorSource::Intensity, "no colours in the file")
+            (ColorSource::Intensity, colors.into())
         }
-        Some(_) => (
-            ColorSource::Constant(DEFAULT_COLOR),
-            "no colours in the file; its intensity looks like noise",
-        ),
-        None => (ColorSource::Constant(DEFAULT_COLOR), "no colours and no intensity in the file"),
+        Some(_) => (constant, format!("{colors}; its intensity looks like noise")),
+        None => (constant, format!("{colors}, and no intensity")),
     }
 }
 
-/// True unless all colours are black or all are white, as programs write them without a measurement.
+/// True unless most colours are black or all are white, as programs write them without a measurement.
 fn are_measured(colors: &[[u16; 3]]) -> bool {
-    let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
-    colors.iter().any(|color| Some(*color) != filler)
+    let n_black = colors.iter().filter(|color| **color == [0; 3]).count();
+    2 * n_black <= colors.len() && colors.iter().any(|color| *color != [u16::MAX; 3])
 }
 
 /// True if the cloud is a georeferenced piece of land, whose forms elevation shows better than intensity does: a good
@@ -121,6 +123,10 @@ mod tests {
         assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
         cloud.colors = Some((0..2500).map(|i| [i, 0, 0]).collect());
         assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
+        cloud.colors = Some((0..2500).map(|i| if i % 3 == 0 { [i; 3] } else { [0; 3] }).collect());
+        assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
+        cloud.colors = Some(vec![[u16::MAX; 3]; 2500]);
+        assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
         cloud.intensity = Some(vec![0.5; 2500]);
         cloud.colors = None;
         assert_eq!(choose_source(&cloud).0, ColorSource::Constant(DEFAULT_COLOR));

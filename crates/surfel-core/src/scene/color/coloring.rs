@@ -46,7 +46,7 @@ impl Coloring {
     }
 
     /// Returns the source for `cloud`, and the reason if it was chosen automatically.
-    pub(super) fn source_for(&self, cloud: &PointCloud) -> (ColorSource, Option<&'static str>) {
+    pub(super) fn source_for(&self, cloud: &PointCloud) -> (ColorSource, Option<String>) {
         match &self.source {
             Some(source) => (source.clone(), None),
             None => {

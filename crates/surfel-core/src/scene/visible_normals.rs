@@ -1,0 +1,87 @@
+//! Normals of what a camera shows, from a small map of the points nearest to it.
+
+use super::camera::{Camera, Projection};
+use crate::math::{DVec3, Vec3};
+
+/// Number of points for each pixel of the map, so that no surface shows through another.
+const POINTS_PER_PIXEL: f64 = 10.0;
+/// Width over height of the map: that of a picture.
+const ASPECT: f64 = 16.0 / 9.0;
+/// Maximum height of the map.
+const MAX_HEIGHT: f64 = 128.0;
+
+/// Returns the unit normals, facing `camera`, of the surface that `points` show it: one for each pixel of a small picture
+/// whose neighbours show points, too. The camera is in the coordinates of the points.
+pub fn visible_normals(points: &[Vec3], camera: &Camera) -> Vec<Vec3> {
+    let height = (points.len() as f64 / POINTS_PER_PIXEL / ASPECT).sqrt().clamp(4.0, MAX_HEIGHT);
+    let (width, height) = ((height * ASPECT) as usize, height as usize);
+    let view = camera.view(DVec3::ZERO, width as u32, height as u32);
+    let mut nearest: Vec<Option<(f32, Vec3)>> = vec![None; width * height];
+    for point in points {
+        let Some((x, y, depth)) = view.project(*point) else { continue };
+        if !(0.0..width as f32).contains(&x) || !(0.0..height as f32).contains(&y) {
+            continue;
+        }
+        let pixel = &mut nearest[y as usize * width + x as usize];
+        if pixel.is_none_or(|(least, _)| depth < least) {
+            *pixel = Some((depth, *point));
+        }
+    }
+    let position = |x: usize, y: usize| nearest[y * width + x].map(|(_, point)| point);
+    let [_, _, forward] = camera.axes();
+    let toward_camera = |point: Vec3| match camera.projection {
+        Projection::Orthographic { .. } => -forward.as_vec3(),
+        _ => camera.position.as_vec3() - point,
+    };
+    let normal = |(x, y): (usize, usize)| {
+        let across = position(x + 1, y)? - position(x - 1, y)?;
+        let along = position(x, y + 1)? - position(x, y - 1)?;
+        let normal = across.cross(along).try_normalize()?;
+        let is_facing = 0.0 < normal.dot(toward_camera(position(x, y)?));
+        Some(if is_facing { normal } else { -normal })
+    };
+    let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y)));
+    inner.filter_map(normal).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! The visible sides of a box have their normals.
+
+    use super::*;
+    use crate::math::Random;
+
+    #[test]
+    fn visible_sides_of_a_box_have_their_normals() {
+        let mut random = Random::new(8, 0);
+        let mut side = |i: usize| {
+            let mut p = Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
+            p[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
+            p
+        };
+        let points: Vec<Vec3> = (0..60_000).map(&mut side).collect();
+        let projections = [
+            Projection::Perspective { view_angle_deg: 35.0 },
+            Projection::Orthographic { height: 4.0 },
+        ];
+        for projection in projections {
+            let camera = Camera {
+                position: DVec3::new(6.0, 3.0, 2.0),
+                focal_point: DVec3::ZERO,
+                view_up: DVec3::Z,
+                projection,
+            };
+            let normals = visible_normals(&points, &camera);
+            let along = |axis: Vec3| normals.iter().filter(|n| 0.95 < n.dot(axis)).count();
+            let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(along);
+            assert!(z < y && y < x && 0 < z, "{x} {y} {z}");
+            assert!(
+                0.8 * normals.len() as f32 <= (x + y + z) as f32,
+                "{} {}",
+                normals.len(),
+                x + y + z
+            );
+        }
+        assert!(visible_normals(&[], &Camera::default()).is_empty());
+    }
+}
