@@ -181,6 +181,7 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("SMOOTH_SPAWN_OFFSET", smooth::SPAWN_OFFSET),
         ("SMOOTH_SPAWN_T_MIN", smooth::SPAWN_T_MIN),
         ("SMOOTH_LIGHT_STEEPNESS", smooth::LIGHT_STEEPNESS),
+        ("LEAVING_DISTANCE", smooth::LEAVING_DISTANCE),
         ("FIELD_SUPPORT", FIELD_SUPPORT),
         ("MIN_FIELD_WEIGHT", MIN_FIELD_WEIGHT),
         ("FIELD_OVERLAP", trace::field::OVERLAP),

@@ -206,13 +206,13 @@ impl FlatCloud {
         parts.fold(field, |bounds, nodes| bounds.union(root_bounds(nodes)))
     }
 
-    /// True if the normals of the field of weighted planes all point to the same side.
-    pub fn has_field_sides(&self) -> bool {
+    /// True if all normals point to the same side of the surface.
+    pub fn has_known_sides(&self) -> bool {
         self.has_outward_normals || self.has_front_sides
     }
 
     fn build_field(&mut self, geometry: &CloudGeometry, progress: &dyn Progress) -> Result<()> {
-        let has_sides = self.has_field_sides();
+        let has_sides = self.has_known_sides();
         match self.surface {
             SurfaceKind::Implicit => {
                 *self.field = FieldTree::new(&self.points, has_sides, progress)?;

@@ -30,8 +30,8 @@ pub use octree_depth::OctreeDepth;
 pub use options::{GatherLimit, SurfaceOptions};
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
-    ColorSums, FIT_REACH, FitPoint, MAX_EXACT_TERMS, OverhangSums, PointSums, SUPPORT_FACTOR,
-    SphereHit, SphereSums, edge_retest_factor,
+    ColorSums, FIT_REACH, FitPoint, LEAVING_DISTANCE, MAX_EXACT_TERMS, OverhangSums, PointSums,
+    SUPPORT_FACTOR, SphereHit, SphereSums, edge_retest_factor,
 };
 pub use sphere::Sphere;
 pub use splat::{

@@ -15,6 +15,9 @@ pub const SPAWN_T_MIN: f32 = 0.5;
 /// Reciprocal of the cosine to the normal from which on a ray toward a light ignores none: it meets the wall beside a floor,
 /// so that no light leaks in between.
 pub const LIGHT_STEEPNESS: f32 = 2.0;
+/// Distance from the origin of a ray, in radii of the disc that it hits, up to which the ray leaves the surface if it comes
+/// from behind the disc: at an edge the discs of one side stick out before the other.
+pub const LEAVING_DISTANCE: f32 = 1.0;
 /// Factors of `edge_retest_factor` for evenly spaced and for random points.
 const EDGE_RETEST_EVEN: f32 = 1.3;
 const EDGE_RETEST_RANDOM: f32 = 1.5;

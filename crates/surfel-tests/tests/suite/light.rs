@@ -2,12 +2,12 @@
 
 use surfel_core::flat::FlatScene;
 use surfel_core::image::encode_srgb8;
-use surfel_core::math::{DVec3, Vec3};
+use surfel_core::math::{DVec3, Random, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, Renderer, Settings};
 use surfel_core::scene::{
-    Background, Camera, Geometry, Light, Material, Projection, Scene, Sky, Sun,
+    Background, Camera, CloudGeometry, Geometry, Light, Material, Projection, Scene, Sky, Sun,
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
@@ -138,26 +138,61 @@ fn a_wide_sun_casts_a_penumbra() {
     assert!(100 < grey, "{grey} pixels in the penumbra");
 }
 
+/// Returns how many pixels show a cloud, and how many of them the sun does not light.
+fn shaded_pixels(points: &CloudGeometry, to_sun: Vec3, view: (DVec3, f64)) -> (usize, usize) {
+    let direction = to_sun.normalize();
+    let sun = Sun { direction, color: Vec3::ONE, angular_diameter_deg: 0.0 };
+    let (toward_camera, height) = view;
+    let focal_point = DVec3::new(0.0, 1.0, 0.0);
+    let camera = Camera {
+        position: focal_point + 10.0 * toward_camera,
+        focal_point,
+        view_up: DVec3::Z,
+        projection: Projection::Orthographic { height },
+    };
+    let scene = scenes::lit(points.clone());
+    let image =
+        scenes::render(&Scene { lights: vec![Light::Sun(sun)], camera, ..scene }, &SETTINGS);
+    let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
+    let n_dark = covered.clone().filter(|(pixel, _)| pixel[0] <= 0.1).count();
+    (covered.count(), n_dark)
+}
+
 #[test]
 fn no_light_leaks_between_a_floor_and_the_wall_before_the_sun() {
     const SPACING: f32 = 0.04;
     let grid = || (0..50 * 50).map(|i| SPACING * Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0));
     let wall = grid().map(|p| Vec3::new(0.0, p.y, p.x));
-    let cloud = PointCloud::from_positions(grid().chain(wall).collect());
-    let direction = Vec3::new(-1.0, 0.0, 0.8).normalize();
-    let sun = Sun { direction, color: Vec3::ONE, angular_diameter_deg: 0.0 };
-    let camera = Camera {
-        position: DVec3::new(10.0, 1.0, 8.0),
-        focal_point: DVec3::new(0.0, 1.0, 0.0),
-        view_up: DVec3::Z,
-        projection: Projection::Orthographic { height: 0.25 },
+    let mut cloud = PointCloud::from_positions(grid().chain(wall).collect());
+    cloud.normals = Some([[Vec3::Z; 2500], [Vec3::X; 2500]].concat());
+    let mut points = scenes::points(cloud, SurfaceKind::Smooth);
+    for sides_are_known in [false, true] {
+        points.has_front_sides = sides_are_known;
+        let view = (DVec3::new(1.0, 0.0, 0.8), 0.25);
+        let shaded = shaded_pixels(&points, Vec3::new(-1.0, 0.0, 0.8), view);
+        assert_eq!(shaded, (64 * 64, 64 * 64));
+    }
+}
+
+#[test]
+fn edges_do_not_shade_themselves_where_sides_are_known() {
+    let mut random = Random::new(4, 0);
+    let mut side = |i: usize| {
+        let mut p = Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
+        let mut normal = Vec3::ZERO;
+        p[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
+        normal[i % 3] = p[i % 3];
+        let noise = Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
+        (p + Vec3::Y + 0.015 * noise, normal)
     };
-    let scene = scenes::scene(cloud, SurfaceKind::Smooth);
-    let image =
-        scenes::render(&Scene { lights: vec![Light::Sun(sun)], camera, ..scene }, &SETTINGS);
-    let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
-    let n_bright = covered.clone().filter(|(pixel, _)| 0.1 < pixel[0]).count();
-    assert_eq!((covered.count(), n_bright), (64 * 64, 0));
+    let (positions, normals) = (0..8000).map(&mut side).unzip();
+    let cloud = PointCloud { normals: Some(normals), ..PointCloud::from_positions(positions) };
+    let mut points = scenes::points(cloud, SurfaceKind::Smooth);
+    let [unknown, known] = [false, true].map(|sides_are_known| {
+        points.has_front_sides = sides_are_known;
+        shaded_pixels(&points, Vec3::new(0.6, 1.0, 0.8), (DVec3::new(1.0, 0.5, 0.8), 4.0)).1
+    });
+    assert!(known == 0 && 0 < unknown, "{unknown} {known}");
 }
 
 #[test]

@@ -317,7 +317,7 @@ impl DiscSearch {
         blocks.clear();
         lanes.clear();
         flips.clear();
-        let guide = (!cloud.has_field_sides()).then(|| field_point(&cloud.points, disc.slot));
+        let guide = (!cloud.has_known_sides()).then(|| field_point(&cloud.points, disc.slot));
         let mut collector = Collector { region: &region, guide, blocks, lanes, flips };
         query_box::<L>(
             &cloud.points,

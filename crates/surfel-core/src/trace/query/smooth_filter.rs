@@ -1,10 +1,12 @@
 //! The smooth surface in queries that only ask whether a ray hits: for packets, and for single rays, which find the same.
 
 use crate::flat::{FlatCloud, FlatPoints, Slot};
-use crate::math::{Aabb, LaneMask, Lanes, PACKET_WIDTH, Ray, SimdTask, Vec3, Vec3Lanes};
+use crate::math::{
+    Aabb, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes, set_bits,
+};
 use crate::surface::{
-    CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, OverhangSums, PointSums,
-    SphereSums,
+    CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, LEAVING_DISTANCE, OverhangSums,
+    PointSums, SphereSums,
 };
 use crate::trace::query::any::HitFilter;
 use crate::trace::query::edge_test::{evaluate_one, is_enclosed};
@@ -17,7 +19,7 @@ use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
-/// Accepts discs near which the ray hits the smooth surface.
+/// Accepts discs near which the ray hits the smooth surface, but for those through which it leaves the surface at its origin.
 #[derive(Clone, Copy)]
 pub struct SmoothFilter<'s>(pub &'s FlatCloud);
 
@@ -27,7 +29,8 @@ impl HitFilter for SmoothFilter<'_> {
 
     #[inline(always)]
     fn accepts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
-        L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
+        !leaves(self.0, ray.direction, hit.distance, hit.slot)
+            && L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
     }
 
     #[inline(always)]
@@ -39,10 +42,45 @@ impl HitFilter for SmoothFilter<'_> {
         distances: L::PacketLanes,
         slots: &[Slot; PACKET_WIDTH],
     ) -> u32 {
+        let lanes = lanes & !leaving_lanes(self.0, rays, lanes, distances, slots);
+        if lanes == 0 {
+            return 0;
+        }
         let found =
             FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
         L::dispatch(found).lanes
     }
+}
+
+/// True if a ray leaves the surface near its origin: it comes from behind the disc. At an edge the discs of one side stick
+/// out before the other.
+#[inline(always)]
+fn leaves(cloud: &FlatCloud, direction: Vec3, distance: f32, slot: Slot) -> bool {
+    let points = &cloud.points;
+    cloud.has_known_sides()
+        && distance < LEAVING_DISTANCE * points.radius(slot)
+        && 0.0 < points.normal(slot).dot(direction)
+}
+
+/// Returns those of `lanes` whose rays leave the surface near their origins.
+#[inline(always)]
+fn leaving_lanes<W: PacketLanes>(
+    cloud: &FlatCloud,
+    rays: &PacketRays<W>,
+    lanes: u32,
+    distances: W,
+    slots: &[Slot; PACKET_WIDTH],
+) -> u32 {
+    if !cloud.has_known_sides() {
+        return 0;
+    }
+    let (distances, [x, y, z]) = (distances.store(), rays.direction().store_packet());
+    let mut leaving = 0;
+    for lane in set_bits::<PACKET_WIDTH>(lanes) {
+        let direction = Vec3::new(x[lane], y[lane], z[lane]);
+        leaving |= u32::from(leaves(cloud, direction, distances[lane], slots[lane])) << lane;
+    }
+    leaving
 }
 
 /// The test whether a ray hits the surface near the disc that it hits.
