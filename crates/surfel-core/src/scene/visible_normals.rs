@@ -56,7 +56,7 @@ mod tests {
         let mut random = Random::new(8, 0);
         let mut side = |i: usize| {
             let mut p = Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
-            p[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
+            p[i % 3] = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
             p
         };
         let points: Vec<Vec3> = (0..60_000).map(&mut side).collect();

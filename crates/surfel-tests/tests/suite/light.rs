@@ -180,7 +180,7 @@ fn edges_do_not_shade_themselves_where_sides_are_known() {
     let mut side = |i: usize| {
         let mut p = Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
         let mut normal = Vec3::ZERO;
-        p[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
+        p[i % 3] = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         normal[i % 3] = p[i % 3];
         let noise = Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
         (p + Vec3::Y + 0.015 * noise, normal)
