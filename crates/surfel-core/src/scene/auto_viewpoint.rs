@@ -54,8 +54,8 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     turn * along.unwrap_or(across)
 }
 
-/// True if nearly all points are visible from azimuth and elevation `seen_from`, and clearly more than from `side`: those of
-/// a scan from one side.
+/// True if nearly all points are visible from azimuth and elevation `seen_from`, and clearly more than from `side`: they are
+/// a scan from there.
 fn is_scan_from(seen_from: (f64, f64), side: (f64, f64), points: &[Vec3], fit: &CameraFit) -> bool {
     /// Fraction of the points that is visible from where a scan was made: edges hide some.
     const MIN_VISIBLE: f64 = 0.9;

@@ -34,8 +34,8 @@ const MAX_SPREAD_WITHIN_CELLS: f64 = 0.7;
 /// Maximum fraction of the points that lie behind others: a scanner does not see through surfaces. Scans had 0.02 to 0.03,
 /// an object whose zero lies within it 0.4.
 const MAX_BEHIND: f64 = 0.25;
-/// Minimum fraction of the normals that face a scanner: it measures no surface from behind. Half of the normals do if their
-/// signs mean nothing, and 0.15 of those of an object about its zero.
+/// Minimum fraction of the normals that face a scanner: it measures no surface from behind. Half of the normals face it if
+/// their signs mean nothing; 0.15 of those of an object face a zero within it.
 const MIN_FACING: f64 = 0.33;
 /// Horizontal angle that should have most of the far points: that of a picture of 16:9.
 const WINDOW_DEG: usize = 90;

@@ -53,10 +53,10 @@ const MIN_UNMEASURED: usize = 10;
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, those of rays that measured nothing, those of classes of noise other than `kept_noise` and those flagged withheld unless
-/// there are no others, and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms
-/// are kept, as they may part at another time; so are those of trained Gaussians, which may have different sizes and
-/// colours.
+/// Drops points with invalid positions, rays that measured nothing, points of classes of noise other than `kept_noise` and
+/// those flagged withheld unless there are no others, and duplicates if chosen, and marks unusable normals and radii.
+/// Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which
+/// may have different sizes and colours.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 ///

@@ -19,7 +19,8 @@ use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
-/// Accepts discs near which the ray hits the smooth surface, but for those through which it leaves the surface at its origin.
+/// Accepts discs near which the ray hits the smooth surface, but for those through which it leaves the surface at its
+/// origin.
 #[derive(Clone, Copy)]
 pub struct SmoothFilter<'s>(pub &'s FlatCloud);
 
@@ -52,8 +53,7 @@ impl HitFilter for SmoothFilter<'_> {
     }
 }
 
-/// True if a ray leaves the surface near its origin: it comes from behind the disc. At an edge the discs of one side stick
-/// out before the other.
+/// True if a ray leaves the surface near its origin: it comes from behind the disc.
 #[inline(always)]
 fn leaves(cloud: &FlatCloud, direction: Vec3, distance: f32, slot: Slot) -> bool {
     let points = &cloud.points;
