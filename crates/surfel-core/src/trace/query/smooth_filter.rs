@@ -1,9 +1,7 @@
 //! The smooth surface in queries that only ask whether a ray hits: for packets, and for single rays, which find the same.
 
 use crate::flat::{FlatCloud, FlatPoints, Slot};
-use crate::math::{
-    Aabb, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes, set_bits,
-};
+use crate::math::{Aabb, LaneMask, Lanes, PACKET_WIDTH, Ray, SimdTask, Vec3, Vec3Lanes};
 use crate::surface::{
     CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, LEAVING_DISTANCE, OverhangSums,
     PointSums, SphereSums,
@@ -30,8 +28,7 @@ impl HitFilter for SmoothFilter<'_> {
 
     #[inline(always)]
     fn accepts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
-        !leaves(self.0, ray.direction, hit.distance, hit.slot)
-            && L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
+        L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
     }
 
     #[inline(always)]
@@ -43,44 +40,12 @@ impl HitFilter for SmoothFilter<'_> {
         distances: L::PacketLanes,
         slots: &[Slot; PACKET_WIDTH],
     ) -> u32 {
-        let lanes = lanes & !leaving_lanes(self.0, rays, lanes, distances, slots);
-        if lanes == 0 {
-            return 0;
-        }
+        let cloud = self.0;
+        let may_leave = cloud.has_known_sides();
         let found =
-            FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
+            FindSurface::<L, false> { cloud, blocks, rays, lanes, distances, slots, may_leave };
         L::dispatch(found).lanes
     }
-}
-
-/// True if a ray leaves the surface near its origin: it comes from behind the disc.
-#[inline(always)]
-fn leaves(cloud: &FlatCloud, direction: Vec3, distance: f32, slot: Slot) -> bool {
-    let points = &cloud.points;
-    cloud.has_known_sides()
-        && distance < LEAVING_DISTANCE * points.radius(slot)
-        && 0.0 < points.normal(slot).dot(direction)
-}
-
-/// Returns those of `lanes` whose rays leave the surface near their origins.
-#[inline(always)]
-fn leaving_lanes<W: PacketLanes>(
-    cloud: &FlatCloud,
-    rays: &PacketRays<W>,
-    lanes: u32,
-    distances: W,
-    slots: &[Slot; PACKET_WIDTH],
-) -> u32 {
-    if !cloud.has_known_sides() {
-        return 0;
-    }
-    let (distances, [x, y, z]) = (distances.store(), rays.direction().store_packet());
-    let mut leaving = 0;
-    for lane in set_bits::<PACKET_WIDTH>(lanes) {
-        let direction = Vec3::new(x[lane], y[lane], z[lane]);
-        leaving |= u32::from(leaves(cloud, direction, distances[lane], slots[lane])) << lane;
-    }
-    leaving
 }
 
 /// The test whether a ray hits the surface near the disc that it hits.
@@ -100,7 +65,12 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
         let points = &cloud.points;
         let radius = points.radius(hit.slot);
         let toward = |normal: Vec3| if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
-        let mut normal = toward(points.normal(hit.slot));
+        let of_disc = points.normal(hit.slot);
+        let leaves = hit.distance < LEAVING_DISTANCE * radius && 0.0 < of_disc.dot(ray.direction);
+        if leaves && cloud.has_known_sides() {
+            return false;
+        }
+        let mut normal = toward(of_disc);
         let mut distance = hit.distance;
         let mut last_step = 0.0;
         for fit in 1..=MAX_FITS {

@@ -6,8 +6,8 @@ use crate::math::{
     set_bits,
 };
 use crate::surface::{
-    CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, MAX_EXACT_TERMS,
-    NeighborhoodStats, OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
+    CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, LEAVING_DISTANCE,
+    MAX_EXACT_TERMS, NeighborhoodStats, OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
 };
 use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
@@ -63,7 +63,16 @@ impl<'s> SmoothTracer<'s> {
         slots: &[Slot; PACKET_WIDTH],
     ) -> SmoothHits<L::PacketLanes> {
         let Self { cloud, blocks } = self;
-        L::dispatch(FindSurface::<L, true> { cloud, blocks, rays, lanes, distances, slots })
+        let may_leave = false;
+        L::dispatch(FindSurface::<L, true> {
+            cloud,
+            blocks,
+            rays,
+            lanes,
+            distances,
+            slots,
+            may_leave,
+        })
     }
 }
 
@@ -75,6 +84,8 @@ pub(super) struct FindSurface<'a, L: Lanes, const HAS_COLORS: bool> {
     pub(super) lanes: u32,
     pub(super) distances: L::PacketLanes,
     pub(super) slots: &'a [Slot; PACKET_WIDTH],
+    /// True if discs count for nothing through which rays leave the surface at their origins.
+    pub(super) may_leave: bool,
 }
 
 impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLORS> {
@@ -82,8 +93,8 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { cloud, blocks, rays, lanes, distances, slots } = self;
-        let candidates = candidates(&cloud.points, rays, lanes, distances, slots);
+        let Self { cloud, blocks, rays, lanes, distances, slots, may_leave } = self;
+        let (candidates, is_from_behind) = candidates(&cloud.points, rays, lanes, distances, slots);
         let mut hits = SmoothHits {
             lanes: 0,
             distances,
@@ -91,7 +102,9 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
             colors: Vec3Lanes::splat(Vec3::ZERO),
             slots: L::PacketLanes::load(&slots.map(f32::from_bits)),
         };
-        let mut left = lanes;
+        let is_near = distances.lt(L::PacketLanes::splat(LEAVING_DISTANCE) * candidates.radius);
+        let leaving = if may_leave { (is_near & is_from_behind).bits() } else { 0 };
+        let mut left = lanes & !leaving;
         while left != 0 {
             let group = candidates.group_of_first(left);
             left &= !group;
@@ -104,7 +117,7 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
     }
 }
 
-/// Returns the hits of rays on discs.
+/// Returns the hits of rays on discs, and where rays reach them from behind.
 #[inline(always)]
 fn candidates<W: PacketLanes>(
     points: &FlatPoints,
@@ -112,20 +125,21 @@ fn candidates<W: PacketLanes>(
     lanes: u32,
     distances: W,
     slots: &[Slot; PACKET_WIDTH],
-) -> PacketCandidates<W> {
+) -> (PacketCandidates<W>, W::Mask) {
     let (mut normals, mut radii) = ([[0.0; PACKET_WIDTH]; 3], [1.0; PACKET_WIDTH]);
     for lane in set_bits::<PACKET_WIDTH>(lanes) {
         let normal = points.normal(slots[lane]);
         [normals[0][lane], normals[1][lane], normals[2][lane]] = normal.to_array();
         radii[lane] = points.radius(slots[lane]);
     }
-    let direction = rays.direction();
-    PacketCandidates {
+    let (normal, direction) = (Vec3Lanes::load_packet(&normals), rays.direction());
+    let candidates = PacketCandidates {
         position: rays.origin().plus(direction.scaled(distances)),
-        normal: facing(Vec3Lanes::load_packet(&normals), direction),
+        normal: facing(normal, direction),
         direction,
         radius: W::load(&radii),
-    }
+    };
+    (candidates, W::splat(0.0).lt(normal.dot(direction)))
 }
 
 /// Moves hits of a group along their rays to the surface, and returns the lanes that reach it.
