@@ -13,10 +13,9 @@ const DEFAULT_COLOR: [u8; 3] = [0xd6, 0xd2, 0xca];
 /// Returns the source of colours that suits `cloud`, and the reason for the choice.
 pub fn choose_source(cloud: &PointCloud) -> (ColorSource, String) {
     let colors = match &cloud.colors {
-        Some(colors) if are_measured(colors) => {
-            return (ColorSource::Rgb, "the colours of the file".into());
-        }
-        Some(_) => "most colours in the file are black, or all white",
+        Some(colors) if are_mostly_black(colors) => "most colours in the file are black",
+        Some(colors) if are_white(colors) => "all colours in the file are white",
+        Some(_) => return (ColorSource::Rgb, "the colours of the file".into()),
         None => "no colours in the file",
     };
     if is_terrain(cloud) {
@@ -32,10 +31,14 @@ pub fn choose_source(cloud: &PointCloud) -> (ColorSource, String) {
     }
 }
 
-/// True unless most colours are black or all are white, as programs write them without a measurement.
-fn are_measured(colors: &[[u16; 3]]) -> bool {
-    let n_black = colors.iter().filter(|color| **color == [0; 3]).count();
-    2 * n_black <= colors.len() && colors.iter().any(|color| *color != [u16::MAX; 3])
+/// True if most colours are black, as programs write them for points that no photograph shows.
+fn are_mostly_black(colors: &[[u16; 3]]) -> bool {
+    colors.len() < 2 * colors.iter().filter(|color| **color == [0; 3]).count()
+}
+
+/// True if all colours are white, as programs write them without a measurement.
+fn are_white(colors: &[[u16; 3]]) -> bool {
+    colors.iter().all(|color| *color == [u16::MAX; 3])
 }
 
 /// True if the cloud is a georeferenced piece of land, whose forms elevation shows better than intensity does: a good
