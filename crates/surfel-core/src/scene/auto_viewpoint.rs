@@ -3,6 +3,7 @@
 use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
 use super::corridor::view_along;
+use super::depth_map::DepthMap;
 use super::ground::ground_axes;
 use super::inliers::range_along;
 use crate::math::{DQuat, DVec3, Vec3};
@@ -161,29 +162,15 @@ fn visible_from((azimuth_deg, elevation_deg): (f64, f64), points: &[Vec3], fit: 
 
 /// Returns the fraction of the points that no other point hides in a small picture.
 fn visible_fraction(points: &[Vec3], camera: &Camera, aspect: f64) -> f64 {
-    // About ten points per covered pixel are enough to hide the points behind them.
-    let height = (points.len() as f64 / 10.0 / aspect).sqrt().clamp(4.0, 128.0) as u32;
-    let width = (f64::from(height) * aspect) as u32;
-    let view = camera.view(DVec3::ZERO, width, height);
-    let mut nearest = vec![f32::INFINITY; width as usize * height as usize];
-    let pixel_and_depth = |point: &Vec3| {
-        let (x, y, depth) = view.project(*point)?;
-        let inside = (0.0..width as f32).contains(&x) && (0.0..height as f32).contains(&y);
-        inside.then(|| (y as usize * width as usize + x as usize, depth))
-    };
-    for (pixel, depth) in points.iter().filter_map(pixel_and_depth) {
-        nearest[pixel] = nearest[pixel].min(depth);
-    }
+    let map = DepthMap::new(points, camera, aspect);
     // A surface that is slanted within a pixel must not hide itself.
     let span = match camera.projection {
         Projection::Orthographic { .. } => 1.0,
         _ => camera.position.distance(camera.focal_point) as f32,
     };
-    let slack = 4.0 * span * view.pixel_size();
-    let is_visible = |point: &&Vec3| {
-        pixel_and_depth(point).is_some_and(|(pixel, depth)| depth <= nearest[pixel] + slack)
-    };
-    points.iter().filter(is_visible).count() as f64 / points.len() as f64
+    let slack = 4.0 * span * map.view.pixel_size();
+    let n_visible = points.iter().filter(|point| map.shows(**point, slack)).count();
+    n_visible as f64 / points.len() as f64
 }
 
 /// Returns the direction of view from a viewpoint at this azimuth and elevation.

@@ -3,6 +3,7 @@
 mod ground;
 mod camera;
 mod camera_fit;
+mod depth_map;
 mod turntable;
 mod inliers;
 mod corridor;

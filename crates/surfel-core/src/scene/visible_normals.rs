@@ -1,45 +1,29 @@
 //! Normals of what a camera shows, from a small map of the points nearest to it.
 
 use super::camera::{Camera, Projection};
-use crate::math::{DVec3, Vec3};
+use super::depth_map::DepthMap;
+use crate::math::Vec3;
 
-/// Number of points for each pixel of the map, so that no surface shows through another.
-const POINTS_PER_PIXEL: f64 = 10.0;
 /// Width over height of the map: that of a picture.
 const ASPECT: f64 = 16.0 / 9.0;
-/// Maximum height of the map.
-const MAX_HEIGHT: f64 = 128.0;
 
 /// Returns the unit normals, facing `camera`, of the surface that `points` show it: one for each pixel of a small picture
 /// whose neighbours show points, too. The camera is in the coordinates of the points.
 pub fn visible_normals(points: &[Vec3], camera: &Camera) -> Vec<Vec3> {
-    let height = (points.len() as f64 / POINTS_PER_PIXEL / ASPECT).sqrt().clamp(4.0, MAX_HEIGHT);
-    let (width, height) = ((height * ASPECT) as usize, height as usize);
-    let view = camera.view(DVec3::ZERO, width as u32, height as u32);
-    let mut nearest: Vec<Option<(f32, Vec3)>> = vec![None; width * height];
-    for point in points {
-        let Some((x, y, depth)) = view.project(*point) else { continue };
-        if !(0.0..width as f32).contains(&x) || !(0.0..height as f32).contains(&y) {
-            continue;
-        }
-        let pixel = &mut nearest[y as usize * width + x as usize];
-        if pixel.is_none_or(|(least, _)| depth < least) {
-            *pixel = Some((depth, *point));
-        }
-    }
-    let position = |x: usize, y: usize| nearest[y * width + x].map(|(_, point)| point);
+    let map = DepthMap::new(points, camera, ASPECT);
     let [_, _, forward] = camera.axes();
     let toward_camera = |point: Vec3| match camera.projection {
         Projection::Orthographic { .. } => -forward.as_vec3(),
         _ => camera.position.as_vec3() - point,
     };
     let normal = |(x, y): (usize, usize)| {
-        let across = position(x + 1, y)? - position(x - 1, y)?;
-        let along = position(x, y + 1)? - position(x, y - 1)?;
+        let across = map.nearest(x + 1, y)? - map.nearest(x - 1, y)?;
+        let along = map.nearest(x, y + 1)? - map.nearest(x, y - 1)?;
         let normal = across.cross(along).try_normalize()?;
-        let is_facing = 0.0 < normal.dot(toward_camera(position(x, y)?));
+        let is_facing = 0.0 < normal.dot(toward_camera(map.nearest(x, y)?));
         Some(if is_facing { normal } else { -normal })
     };
+    let (width, height) = map.size;
     let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y)));
     inner.filter_map(normal).collect()
 }
@@ -49,7 +33,7 @@ mod tests {
     //! The visible sides of a box have their normals.
 
     use super::*;
-    use crate::math::Random;
+    use crate::math::{DVec3, Random};
 
     #[test]
     fn visible_sides_of_a_box_have_their_normals() {
