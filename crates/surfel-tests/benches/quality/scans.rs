@@ -126,7 +126,8 @@ fn compare_surfaces(
     let mut compared = Vec::new();
     for (surface, kind) in &selection.kinds {
         let begin = Instant::now();
-        let points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
+        let mut points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
+        points.has_front_sides = points.cloud().has_stations();
         report_secs(case.name, &format!("{surface} prepared"), begin);
         if selection.written_clouds.is_some() {
             let preparation = Preparation::default();
