@@ -5,6 +5,9 @@
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
+# What is built once is built faster without what a second build could use.
+export CARGO_INCREMENTAL=0
+
 passed=0
 failed=0
 skipped=0
