@@ -1,13 +1,12 @@
 //! Reads the points of a file that a filter keeps.
 
 use surfel_core::progress::Progress;
-use surfel_core::words::counted;
 
 use crate::error::{Error, Result};
 use crate::file::Input;
 use crate::format::{ReadPoints, detect};
 use crate::options::{LoadOptions, Loaded};
-use crate::table::ColumnRole;
+use crate::table::{ColumnRole, keep_matching, note_kept, shrink};
 
 /// Reads points with `read`, which keeps those that the filter of `options` keeps, and says how many these are. Columns
 /// that the filter alone needs are dropped afterwards.
@@ -23,12 +22,27 @@ pub(crate) fn read_filtered(
     let Loaded { mut cloud, mut info } = loaded.map_err(|error| with_all_columns(error, input))?;
     let n_kept = cloud.len() as u64;
     let n_points = info.n_points.replace(n_kept).unwrap_or(n_kept);
-    progress.note(&format!(
-        "{}: {n_kept} of {} meet {}",
-        input.name,
-        counted(n_points, "point"),
-        filter.describe()
-    ));
+    note_kept(input, n_kept, n_points, filter, progress);
+    options.columns.drop_others(&mut cloud);
+    Ok(Loaded { cloud, info })
+}
+
+/// Drops the points that the filter of `options` does not keep, and the columns that `options` do not choose, from a
+/// cloud that was read whole.
+pub(crate) fn filter_loaded(
+    input: &Input,
+    Loaded { mut cloud, mut info }: Loaded,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    if let Some(filter) = &options.filter {
+        let n_points = cloud.len() as u64;
+        keep_matching(&mut cloud, 0, Some(filter))?;
+        shrink(&mut cloud);
+        let n_kept = cloud.len() as u64;
+        info.n_points = Some(n_kept);
+        note_kept(input, n_kept, n_points, filter, progress);
+    }
     options.columns.drop_others(&mut cloud);
     Ok(Loaded { cloud, info })
 }

@@ -10,13 +10,14 @@ use crate::error::{Error, Result};
 use crate::file::{Input, ResourceResolver};
 use crate::filtered::read_filtered;
 use crate::format::{self, Reader, detect};
+use crate::gltf;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 
 /// Reads a file to a scene graph: a glTF scene as it is, else triangles with their materials if the file has any, else
 /// its points.
 ///
 /// Clouds and meshes belong to one node, which has the name of the file. Points are those of the file, not
-/// prepared. The columns of `options` apply to points only.
+/// prepared. The columns and the filter of `options` apply to points only.
 ///
 /// # Errors
 ///
@@ -65,7 +66,8 @@ fn read(
     progress.check()?;
     let read_points = match &detect(input)?.read {
         Reader::Scene(read) => {
-            return read(input, resolver, options.animation.as_deref(), progress);
+            let scene = read(input, resolver, options.animation.as_deref(), progress)?;
+            return gltf::filter_points(input, scene, options, progress);
         }
         Reader::Mesh { has_triangles, read_points, read_mesh } if has_triangles(input)? => {
             match read_mesh(input, &resolver, options, progress) {

@@ -6,7 +6,7 @@ use surfel_core::progress::Progress;
 
 use crate::error::{Error, Result};
 use crate::file::{Input, ResourceResolver};
-use crate::filtered::read_filtered;
+use crate::filtered::{filter_loaded, read_filtered};
 use crate::format::{Reader, detect};
 use crate::gltf;
 use crate::merge::merge_loaded;
@@ -89,6 +89,10 @@ fn read_points(
         Reader::Points(read_points) | Reader::Mesh { read_points, .. } => {
             read_filtered(*read_points, input, options, progress)
         }
-        Reader::Scene(read) => Ok(gltf::merge_points(read(input, resolver, None, progress)?)),
+        Reader::Scene(read) => {
+            let scene = read(input, resolver, None, progress)?;
+            let loaded = gltf::merge_points(input, scene, options.origin)?;
+            filter_loaded(input, loaded, options, progress)
+        }
     }
 }

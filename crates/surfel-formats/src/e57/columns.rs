@@ -14,12 +14,17 @@ pub(super) struct ScanColumn {
     pub number_type: NumberType,
     /// Index among the scan's fields.
     pub field: usize,
+    /// Index of the field that is not 0 where the value is invalid.
+    pub invalid_flag: Option<usize>,
     /// Factor and summand that bring colours to 0..65535.
     pub scale: [f64; 2],
 }
 
 /// Returns the columns of a scan, without its position, which may be in spherical coordinates.
 pub(super) fn scan_columns(scan: &PointCloud) -> Vec<ScanColumn> {
+    let find = |name: RecordName| scan.prototype.iter().position(|record| record.name == name);
+    let invalid_color = find(RecordName::IsColorInvalid);
+    let invalid_intensity = find(RecordName::IsIntensityInvalid);
     let fields = scan.prototype.iter().enumerate();
     let columns = fields.filter_map(|(field, record)| {
         let role = role(&record.name)?;
@@ -30,7 +35,12 @@ pub(super) fn scan_columns(scan: &PointCloud) -> Vec<ScanColumn> {
             _ => [1.0, 0.0],
         };
         let number_type = Encoding::new(&record.data_type).number_type();
-        Some(ScanColumn { role, number_type, field, scale })
+        let invalid_flag = match record.name {
+            RecordName::ColorRed | RecordName::ColorGreen | RecordName::ColorBlue => invalid_color,
+            RecordName::Intensity => invalid_intensity,
+            _ => None,
+        };
+        Some(ScanColumn { role, number_type, field, invalid_flag, scale })
     });
     columns.collect()
 }

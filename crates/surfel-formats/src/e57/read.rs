@@ -23,6 +23,10 @@ use crate::table::{
     CloudBuilder, ColumnField, ColumnRole, Field, MAX_FIELDS, NumberType, RecordLayout,
 };
 
+/// Maximum bytes for columns that only other scans have, for each byte of the file.
+const MAX_PADDING_PER_BYTE: u64 = 64;
+/// Bytes for such columns that a file of any size may need.
+const BASE_PADDING: u64 = 64 << 20;
 /// Number of points of a block, which a thread decodes.
 const POINTS_PER_BLOCK: u64 = 1 << 14;
 /// Number of blocks whose records are in memory at a time.
@@ -78,6 +82,8 @@ pub(crate) fn read(
     let mut n_scan_points = Vec::new();
     let n_invalid = AtomicU64::new(0);
     let mut n_points = 0;
+    let mut padding_budget =
+        BASE_PADDING.saturating_add(MAX_PADDING_PER_BYTE.saturating_mul(input.len() as u64));
     let n_claimed =
         document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));
     progress.begin(&format!("read {}", input.name), n_claimed);
@@ -93,6 +99,14 @@ pub(crate) fn read(
                 salvage.accept(input.truncated(location, n_readable, scan.n_points))?;
             }
             n_points += n_readable;
+            // Without a limit, the many columns of a scan of one point would make a small file ask for any memory.
+            let n_lacking = roles.iter().filter(|role| !scan.has_column(role)).count() as u64;
+            let padding = n_readable.saturating_mul(8 * n_lacking);
+            let left = padding_budget.checked_sub(padding);
+            padding_budget = left.ok_or_else(|| Error::OutOfMemory {
+                file: input.name.to_string(),
+                n_points: n_claimed,
+            })?;
             let firsts: Vec<u64> = (0..n_readable).step_by(POINTS_PER_BLOCK as usize).collect();
             for batch in firsts.chunks(BLOCKS_PER_BATCH) {
                 let decode = |first: &u64| {

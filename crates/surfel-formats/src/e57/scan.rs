@@ -103,6 +103,11 @@ impl Scan {
         })
     }
 
+    /// Returns true if the scan has a column of this role.
+    pub fn has_column(&self, role: &ColumnRole) -> bool {
+        self.columns.iter().any(|column| column.role == *role)
+    }
+
     /// Returns the station of the scan, which is the `index`-th of the file. Ranges and angles are measured from it.
     pub fn station(&self, index: usize, description: &PointCloud) -> ScanStation {
         let is_known = description.transform.is_some() || self.cartesian.is_none();
@@ -188,13 +193,18 @@ impl Block<'_> {
         values
     }
 
-    /// Returns the values of a column, colours scaled; `None` if the scan has no such column.
+    /// Returns the values of a column, colours scaled, NaN where the file says that a value is invalid; `None` if the
+    /// scan has no such column.
     fn column(&self, role: &ColumnRole) -> Option<Vec<f64>> {
         let column = self.scan.columns.iter().find(|column| column.role == *role)?;
         let mut values = self.values(column.field);
         let [factor, summand] = column.scale;
         if (factor, summand) != (1.0, 0.0) {
             values.iter_mut().for_each(|value| *value = *value * factor + summand);
+        }
+        if let Some(flag) = column.invalid_flag {
+            let flagged = values.iter_mut().zip(self.values(flag)).filter(|(_, flag)| *flag != 0.0);
+            flagged.for_each(|(value, _)| *value = f64::NAN);
         }
         Some(values)
     }

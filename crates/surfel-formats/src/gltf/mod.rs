@@ -13,6 +13,7 @@ mod accessor;
 mod extensions;
 mod texture;
 mod point_cloud;
+mod filter;
 mod inspect;
 mod material;
 mod triangulate;
@@ -25,6 +26,7 @@ mod instancing;
 mod node;
 mod animation;
 
+pub(crate) use filter::filter_points;
 pub(crate) use inspect::inspect;
 pub(crate) use point_cloud::merge_points;
 

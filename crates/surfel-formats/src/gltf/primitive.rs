@@ -3,8 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use surfel_core::words::counted;
 
-use surfel_core::image::encode_srgb;
-use surfel_core::math::{Vec3, Vec4};
+use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::scene::{Geometry, Mesh, Morph};
 
@@ -13,6 +12,7 @@ use super::attributes::VertexAttributes;
 use super::document::Document;
 use super::extensions;
 use super::json::Json;
+use super::point_cloud::encode_color;
 use super::triangulate::{TriangleTopology, compact_vertices, triangulate};
 use crate::error::Result;
 use crate::mesh::{drop_invalid_triangles, repair_normals};
@@ -184,11 +184,7 @@ fn read_points(vertices: &VertexAttributes) -> Result<Option<PointCloud>> {
         cloud.normals = None;
     }
     // Colours are linear in glTF and sRGB-encoded in clouds.
-    let encode = |color: Vec4| {
-        let channels = color.truncate().to_array();
-        channels.map(|channel| (65535.0 * encode_srgb(channel) + 0.5) as u16)
-    };
-    cloud.colors = vertices.colors()?.map(|colors| colors.into_iter().map(encode).collect());
+    cloud.colors = vertices.colors()?.map(|colors| colors.into_iter().map(encode_color).collect());
     let n_all = cloud.len();
     drop_unused_target_columns(&mut cloud.morphs, cloud.normals.is_some(), false);
     let is_finite = |i: &u32| {

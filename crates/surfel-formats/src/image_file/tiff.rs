@@ -18,6 +18,9 @@ use super::png::samples;
 use crate::error::Result;
 use crate::file::{check_output_path, write_error, write_file};
 
+/// The value of pixels that show nothing, as files of elevations have it.
+const NO_DATA: f32 = -9999.0;
+
 /// Elevations of a plan's pixels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightMap {
@@ -25,13 +28,10 @@ pub struct HeightMap {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Elevation at the centre of each pixel; [`HeightMap::NO_DATA`] where nothing is.
+    /// Elevation at the centre of each pixel; NaN where nothing is.
     pub elevations: Vec<f32>,
-}
-
-impl HeightMap {
-    /// The value of pixels that show nothing, as elevation models have it.
-    pub const NO_DATA: f32 = -9999.0;
+    /// The place of the pixels.
+    pub georeference: Georeference,
 }
 
 /// Writes a picture.
@@ -53,15 +53,17 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
 /// # Errors
 ///
 /// Fails if the extension is neither .tif nor .tiff, and if the file cannot be written.
-pub fn save_height_map(path: &Path, map: &HeightMap, georeference: Georeference) -> Result<()> {
+pub fn save_height_map(path: &Path, map: &HeightMap) -> Result<()> {
     check_height_map(path)?;
     let options = ImageOptions {
         alpha: Alpha::Drop,
-        georeference: Some(georeference),
+        georeference: Some(map.georeference),
         ..ImageOptions::default()
     };
     let size = (map.width, map.height);
-    write_samples::<Gray32Float>(path, size, &map.elevations, &options, Some(HeightMap::NO_DATA))
+    let sample = |elevation: &f32| if elevation.is_nan() { NO_DATA } else { *elevation };
+    let samples: Vec<f32> = map.elevations.iter().map(sample).collect();
+    write_samples::<Gray32Float>(path, size, &samples, &options, Some(NO_DATA))
 }
 
 /// Checks that a file of elevations can be written.

@@ -100,7 +100,10 @@ fn holds(field: &Field, values: ExtraValues, cloud: &PointCloud) -> bool {
 
 /// Returns the bytes of a value in `field`, and their number.
 fn stored(field: &Field, value: f64) -> ([u8; 8], usize) {
-    let number = (value - field.offset) / field.scale;
+    let number = match field.no_data {
+        Some(no_data) if value.is_nan() => no_data,
+        _ => (value - field.offset) / field.scale,
+    };
     let mut bytes = [0; 8];
     macro_rules! put {
         ($number:expr) => {{

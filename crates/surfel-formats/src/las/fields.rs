@@ -167,6 +167,9 @@ pub(super) fn extra_fields(descriptions: &[u8]) -> Vec<ExtraField> {
                 offset: if has_offset { read_f64(description, 136 + 8 * value) } else { 0.0 },
                 ..Field::new(byte, number_type)
             };
+            let has_no_data = options & HAS_NO_DATA != 0 && field.has_float_column();
+            let no_data = has_no_data.then(|| no_data(description, number_type, value));
+            let field = Field { no_data, ..field };
             let name = if n_values == 1 { name.clone() } else { format!("{name}[{value}]") };
             let description = single_description(description, &name, value);
             fields.push(ExtraField { name, field, description });
@@ -174,6 +177,21 @@ pub(super) fn extra_fields(descriptions: &[u8]) -> Vec<ExtraField> {
         }
     }
     fields
+}
+
+/// Returns the number that stands for a missing one in the column `value` of a description, which has it in the widest
+/// type of its kind.
+fn no_data(description: &[u8], number_type: NumberType, value: usize) -> f64 {
+    let bytes = description[40 + 8 * value..].first_chunk().copied().unwrap_or_default();
+    match number_type {
+        NumberType::U8 | NumberType::U16 | NumberType::U32 | NumberType::U64 => {
+            u64::from_le_bytes(bytes) as f64
+        }
+        NumberType::I8 | NumberType::I16 | NumberType::I32 | NumberType::I64 => {
+            i64::from_le_bytes(bytes) as f64
+        }
+        NumberType::F32 | NumberType::F64 => f64::from_le_bytes(bytes),
+    }
 }
 
 /// Returns the description of one of the values that `description` describes. Its least and greatest value are left out,

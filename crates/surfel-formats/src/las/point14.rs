@@ -197,7 +197,7 @@ impl<R: Read + Seek> LayeredFieldDecompressor<R> for Point14 {
                 source.seek(SeekFrom::Current(layer.size.into()))?;
                 continue;
             }
-            // `Chunks::check_layers` has compared the sizes with that of the chunk.
+            // `Chunks::check` has compared the sizes with that of the chunk.
             let mut bytes = vec![0; layer.size as usize];
             source.read_exact(&mut bytes)?;
             layer.decoder = ArithmeticDecoder::new(Cursor::new(bytes));

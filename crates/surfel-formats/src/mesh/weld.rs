@@ -12,9 +12,8 @@ pub(crate) struct Welded {
 
 /// Welds corners with equal keys. Vertices are numbered in the order of their first corners.
 ///
-/// There must be fewer than 2^32 keys.
-// It sorts, because no choice of keys makes sorting slow, as some make a hash table.
-/// Gives equal keys one index, in the order of their first appearance.
+/// There must be fewer than 2^32 keys. It sorts them, because no choice of keys makes sorting slow, as some make a hash
+/// table.
 pub(crate) fn weld(keys: &[[u32; 3]]) -> Welded {
     let mut order: Vec<([u32; 3], u32)> =
         keys.par_iter().enumerate().map(|(corner, key)| (*key, corner as u32)).collect();

@@ -140,20 +140,26 @@ impl Parsed {
     }
 
     fn add_vertex(&mut self, rest: &[u8]) -> std::result::Result<(), LineError> {
-        let ([x, y, z, rest @ ..], count) = numbers::<3, 7>(rest)?;
-        self.positions.push(DVec3::new(x, y, z));
-        // A weight may stand between position and colour, or at the end.
-        let color = match count {
-            6 => Some([rest[0], rest[1], rest[2]]),
-            7 => Some([rest[1], rest[2], rest[3]]),
-            _ => None,
-        };
+        let (position, color) = vertex(rest)?;
+        self.positions.push(DVec3::from_array(position));
         if color.is_some() || !self.colors.is_empty() {
             self.colors.resize(self.positions.len() - 1, Vec3::NAN);
             self.colors.push(color.map_or(Vec3::NAN, |color| DVec3::from_array(color).as_vec3()));
         }
         Ok(())
     }
+}
+
+/// Parses the position of a vertex and its colour, if it has one.
+pub(super) fn vertex(rest: &[u8]) -> std::result::Result<([f64; 3], Option<[f64; 3]>), LineError> {
+    let ([x, y, z, rest @ ..], count) = numbers::<3, 7>(rest)?;
+    // A weight may stand between position and colour, or at the end.
+    let color = match count {
+        6 => Some([rest[0], rest[1], rest[2]]),
+        7 => Some([rest[1], rest[2], rest[3]]),
+        _ => None,
+    };
+    Ok(([x, y, z], color))
 }
 
 /// Parses a corner of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.

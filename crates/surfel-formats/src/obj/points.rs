@@ -1,21 +1,26 @@
 //! Reads the vertices of OBJ files as points, with the colours that some programs write after the coordinates.
 
+use rayon::prelude::*;
 use surfel_core::progress::Progress;
-use surfel_core::words::counted;
 
+use super::lines::{line_end, split_keyword, words};
 use super::mesh::count_triangles;
+use super::parse::vertex;
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
-    ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange,
-    parse_number, read_rows,
+    ColorRange, ColumnField, ColumnRole, Field, FindEnd, LineError, NumberType, ParseFault,
+    RecordLayout, RowRange, TextChunk, read_rows,
 };
 
 /// Reads the first vertex.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
-    first_vertex(input).map(file_info)
+    let (byte, rest) = first_vertex(input)?;
+    let first = vertex(rest).map_err(|error| ParseFault::new(byte, error).into_error(input));
+    let (_, color) = first?;
+    Ok(file_info(if color.is_some() { 6 } else { 3 }))
 }
 
 /// Reads the vertices, also those that no face uses.
@@ -24,7 +29,8 @@ pub(crate) fn read(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let n_columns = first_vertex(input)?;
+    first_vertex(input)?;
+    let n_columns = if has_colors(input) { 6 } else { 3 };
     let roles =
         [0, 1, 2].map(ColumnRole::Position).into_iter().chain([0, 1, 2].map(ColumnRole::Color));
     let layout_of = |sample: &[u8]| {
@@ -40,7 +46,8 @@ pub(crate) fn read(
             .expect("the first three columns are x, y and z")
     };
     let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
-    let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None };
+    let line_end = Some(line_end as FindEnd);
+    let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None, line_end };
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     let mut salvage = Salvage::new(input, options.salvage);
     let (cloud, n_points) = read_rows(
@@ -68,49 +75,45 @@ fn file_info(n_columns: usize) -> FileInfo {
     }
 }
 
-/// Returns the number of columns of the first vertex: 3, or 6 with its colour.
-fn first_vertex(input: &Input) -> Result<usize> {
-    let mut lines = input.split(|byte| *byte == b'\n').enumerate();
-    let Some((i, line)) = lines.find(|(_, line)| vertex_words(line).is_some()) else {
+/// Returns the byte and the arguments of the first vertex line.
+fn first_vertex<'a>(input: &'a Input) -> Result<(usize, &'a [u8])> {
+    let text = TextChunk { text: input, start: 0 };
+    let mut vertices = text.lines(line_end).filter_map(|(byte, line)| {
+        let (keyword, rest) = split_keyword(line);
+        (keyword == b"v").then_some((byte, rest))
+    });
+    vertices.next().ok_or_else(|| {
         let advice = "the file holds no points";
-        return Err(input.malformed(Location::Byte(0), "no vertex", "lines `v X Y Z`", advice));
-    };
-    match vertex_words(line).into_iter().flatten().count() {
-        3 | 4 => Ok(3),
-        6 | 7 => Ok(6),
-        n_words => Err(input.malformed(
-            Location::Line(i as u64 + 1),
-            counted(n_words, "number"),
-            "3 for a vertex, or 6 with its colour",
-            "repair or remove the line",
-        )),
-    }
+        input.malformed(Location::Byte(0), "no vertex", "lines `v X Y Z`", advice)
+    })
 }
 
-/// Returns the words after the `v` of a vertex line; `None` for other lines.
-fn vertex_words(line: &[u8]) -> Option<impl Iterator<Item = &[u8]>> {
-    let rest = line.trim_ascii().strip_prefix(b"v")?;
-    let is_vertex = rest.first().is_some_and(u8::is_ascii_whitespace);
-    is_vertex.then(|| rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()))
+/// Returns true if any vertex has a colour.
+fn has_colors(input: &Input) -> bool {
+    let chunks = TextChunk { text: input, start: 0 }.split(line_end);
+    chunks.par_iter().any(|chunk| {
+        chunk.lines(line_end).any(|(_, line)| {
+            let (keyword, rest) = split_keyword(line);
+            keyword == b"v" && words(rest).nth(5).is_some()
+        })
+    })
 }
 
-/// Appends the coordinates and colour of a vertex line to `row`; other lines add nothing.
+/// Appends the coordinates and colour of a vertex line to `row`, NaN for a colour that it lacks; other lines add
+/// nothing.
 fn parse_vertex(
     line: &[u8],
     n_columns: usize,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
-    let Some(words) = vertex_words(line) else { return Ok(()) };
-    for word in words {
-        row.push(parse_number(word)?);
+    let (keyword, rest) = split_keyword(line);
+    if keyword != b"v" {
+        return Ok(());
     }
-    // A weight may stand between position and colour, or at the end.
-    if row.len() == n_columns + 1 {
-        row.remove(3);
-    }
-    if row.len() != n_columns {
-        let expected = format!("{n_columns} as in the first vertex");
-        return Err(LineError { found: counted(row.len(), "number"), expected });
+    let (position, color) = vertex(rest)?;
+    row.extend(position);
+    if n_columns == 6 {
+        row.extend(color.unwrap_or([f64::NAN; 3]));
     }
     Ok(())
 }

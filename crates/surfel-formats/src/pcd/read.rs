@@ -165,7 +165,7 @@ fn read_binary(
     };
     let fields = columns.iter().map(|(name, field)| (name.as_str(), *field));
     let sample = &records[..records.len().min(1 << 20)];
-    let columns = named_columns(fields, stride, false, sample, &options.columns);
+    let columns = named_columns(fields, stride, false, sample, &records, &options.columns);
     let layout = layout(stride, columns, options);
     let tolerance = match layout.position[0].number_type {
         NumberType::F64 => Tolerance::UNSTATED,
@@ -221,6 +221,7 @@ fn read_ascii(
         line: header.body_line,
         n_columns: columns.len(),
         limit: Some(header.n_points()),
+        line_end: None,
     };
     let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_point(line, header, row);
     let stride = 8 * columns.len();
@@ -229,7 +230,7 @@ fn read_ascii(
             .iter()
             .enumerate()
             .map(|(i, (name, field))| (name.as_str(), Field::parsed(8 * i, field.file_type)));
-        let columns = named_columns(fields, stride, false, sample, &options.columns);
+        let columns = named_columns(fields, stride, false, sample, sample, &options.columns);
         layout(stride, columns, options)
     };
     progress.begin(&format!("read {}", input.name), (input.len() - header.body) as u64);

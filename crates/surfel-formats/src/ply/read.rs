@@ -158,8 +158,7 @@ fn read_binary(
         packed = pack_vertices(salvage, start, vertex, big_endian, progress)?;
         &packed
     };
-    let layout =
-        layout(stride, big_endian, columns, &records[..records.len().min(1 << 20)], options);
+    let layout = layout(stride, big_endian, columns, records, options);
     let tolerance = match layout.position[0].number_type {
         NumberType::F64 => Tolerance::UNSTATED,
         _ => Tolerance::F32_COORDINATES,
@@ -198,13 +197,14 @@ fn read_ascii(
     let columns: Vec<(&str, NumberType)> =
         numbers.map(|p| (p.name.as_str(), p.number_type)).collect();
     let n_columns = columns.len();
-    let rows = RowRange { start, end: None, line, n_columns, limit: Some(vertex.count) };
+    let rows =
+        RowRange { start, end: None, line, n_columns, limit: Some(vertex.count), line_end: None };
     let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
     let layout_of = |sample: &[u8]| {
         let fields = columns.iter().enumerate();
         let fields =
             fields.map(|(i, (name, number_type))| (*name, Field::parsed(8 * i, *number_type)));
-        let columns = named_columns(fields, 8 * n_columns, false, sample, &options.columns);
+        let columns = named_columns(fields, 8 * n_columns, false, sample, sample, &options.columns);
         RecordLayout::new(8 * n_columns, false, columns, &options.columns)
             .expect("x, y and z were found")
     };
@@ -245,9 +245,10 @@ fn layout(
     stride: usize,
     big_endian: bool,
     columns: Vec<(&str, Field)>,
-    sample: &[u8],
+    records: &[u8],
     options: &LoadOptions,
 ) -> RecordLayout {
-    let columns = named_columns(columns.into_iter(), stride, big_endian, sample, &options.columns);
+    let (columns, sample) = (columns.into_iter(), &records[..records.len().min(1 << 20)]);
+    let columns = named_columns(columns, stride, big_endian, sample, records, &options.columns);
     RecordLayout::new(stride, big_endian, columns, &options.columns).expect("x, y and z were found")
 }

@@ -52,6 +52,7 @@ pub(crate) fn read(
             line: scan.line,
             n_columns: roles.len(),
             limit: None,
+            line_end: None,
         };
         let n_before = builder.n_points();
         n_cells_read += match append_rows(&mut builder, rows, &parse, progress) {

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use surfel_core::progress::Progress;
 
+use super::line_end::FindEnd;
 use super::line_reader::LineError;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
@@ -26,9 +27,6 @@ pub(crate) struct ParseFault {
     /// The fault of the line.
     pub error: LineError,
 }
-
-/// Returns the length of the record, a line or more, at the start of a text; `None` if it does not end.
-pub(crate) type FindEnd = fn(&[u8]) -> Option<usize>;
 
 impl<'a> TextChunk<'a> {
     /// Yields the trimmed lines that are not empty, each with the byte of the file at which it begins.
@@ -96,16 +94,12 @@ pub(crate) fn line_at(input: &Input, at: usize) -> Location {
     Location::Line(1 + memchr::memchr_iter(b'\n', &input[..at]).count() as u64)
 }
 
-/// Returns the length of the line at the start of `text`, its line feed included; `None` if it does not end.
-pub(crate) fn find_line_end(text: &[u8]) -> Option<usize> {
-    memchr::memchr(b'\n', text).map(|at| at + 1)
-}
-
 #[cfg(test)]
 mod tests {
     //! Chunks of a text end with whole lines and together are all of it.
 
     use super::*;
+    use crate::table::find_line_end;
 
     #[test]
     fn chunks_end_with_lines_and_cover_the_text() {

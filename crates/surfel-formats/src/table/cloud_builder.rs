@@ -42,6 +42,7 @@ impl<'a, F: Fn(&[u8]) -> RecordLayout> CloudBuilder<'a, F> {
             let cloud = layout.empty_cloud(self.origin.unwrap_or_else(choose));
             (layout, cloud)
         });
+        layout.demote_classes(batch, cloud);
         let n_before = cloud.len();
         let n_new: usize = batch.iter().map(|records| records.len() / layout.stride).sum();
         grow_checked(cloud, n_before + n_new, self.input)?;

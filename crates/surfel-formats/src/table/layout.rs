@@ -1,8 +1,10 @@
 //! The layout of records of fixed length, which PLY, LAS and parsed text share, and their decoding into columns.
 
+use rayon::prelude::*;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Scalar, Values};
 
+use super::color_range::is_byte;
 use super::column_choice::ColumnChoice;
 use super::column_role::ColumnRole;
 use super::column_slices::{ColumnSlices, ValuesMut};
@@ -38,6 +40,8 @@ pub(crate) struct Field {
     pub scale: f64,
     /// Summand after the factor.
     pub offset: f64,
+    /// Number in the record that stands for a missing value, which is read as NaN. Only columns of floats can hold it.
+    pub no_data: Option<f64>,
 }
 
 /// A column of a file: its role in the cloud, and its field in the records.
@@ -86,7 +90,8 @@ impl NumberType {
 impl Field {
     /// An unscaled number at `byte`.
     pub fn new(byte: usize, number_type: NumberType) -> Self {
-        Self { byte, number_type, file_type: number_type, bits: None, scale: 1.0, offset: 0.0 }
+        let (scale, offset) = (1.0, 0.0);
+        Self { byte, number_type, file_type: number_type, bits: None, scale, offset, no_data: None }
     }
 
     /// A number of `file_type` that was parsed to f64 at `byte`.
@@ -106,8 +111,43 @@ impl Field {
         value[0]
     }
 
+    /// Returns true if the column of the field has floats, which may be NaN.
+    pub fn has_float_column(&self) -> bool {
+        matches!(self.empty_values(), Values::F32(_) | Values::F64(_))
+    }
+
+    /// Returns true if all values in `records` can be classes or are missing.
+    pub fn holds_classes(&self, records: &[u8], stride: usize, big_endian: bool) -> bool {
+        const RECORDS_PER_TASK: usize = 1 << 14;
+        let is_class = |record| {
+            let value = self.value(record, big_endian);
+            is_byte(value) || value.is_nan()
+        };
+        self.file_type == NumberType::U8
+            || records
+                .par_chunks(RECORDS_PER_TASK * stride)
+                .all(|records| records.chunks_exact(stride).all(is_class))
+    }
+
     /// Calls `set` with each element of `out` and the field's value in the record of the same index.
     fn fill<T>(
+        &self,
+        records: &[u8],
+        stride: usize,
+        big_endian: bool,
+        out: &mut [T],
+        set: impl Fn(&mut T, f64),
+    ) {
+        match self.no_data.map(|number| number * self.scale + self.offset) {
+            Some(missing) => self.fill_numbers(records, stride, big_endian, out, |slot, v| {
+                set(slot, if v == missing { f64::NAN } else { v });
+            }),
+            None => self.fill_numbers(records, stride, big_endian, out, set),
+        }
+    }
+
+    /// Does the work of `fill`, without regard to missing values.
+    fn fill_numbers<T>(
         &self,
         records: &[u8],
         stride: usize,
@@ -228,6 +268,27 @@ impl RecordLayout {
         }
     }
 
+    /// Makes the classes of `cloud` a scalar column, in which they are not clamped to bytes, if a batch of further
+    /// records has a value that is no class.
+    pub fn demote_classes(&mut self, batch: &[Vec<u8>], cloud: &mut PointCloud) {
+        let Some(field) = self.classification else { return };
+        if batch.iter().all(|records| field.holds_classes(records, self.stride, self.big_endian)) {
+            return;
+        }
+        self.classification = None;
+        let classes = cloud.classification.take().unwrap_or_default().into_iter();
+        let values = match field.empty_values() {
+            Values::U8(_) => Values::U8(classes.collect()),
+            Values::U16(_) => Values::U16(classes.map(u16::from).collect()),
+            Values::I32(_) => Values::I32(classes.map(i32::from).collect()),
+            Values::F32(_) => Values::F32(classes.map(f32::from).collect()),
+            Values::F64(_) => Values::F64(classes.map(f64::from).collect()),
+        };
+        let name = "classification".to_owned();
+        self.scalars.push((name.clone(), field));
+        cloud.scalars.push(Scalar { name, values });
+    }
+
     /// Returns the world position of a single record.
     pub fn world_position(&self, record: &[u8]) -> DVec3 {
         DVec3::from_array(self.position.map(|field| field.value(record, self.big_endian)))
@@ -301,5 +362,8 @@ mod tests {
         let number = Field { scale: 0.5, offset: 1.0, ..Field::new(1, NumberType::U16) };
         assert_eq!(number.value(&record, true), 130.0);
         assert_eq!(number.value(&record, false), 257.5);
+        let missing = Field { no_data: Some(513.0), ..number };
+        assert!(missing.value(&record, false).is_nan());
+        assert_eq!(missing.value(&record, true), 130.0);
     }
 }

@@ -11,6 +11,7 @@ use surfel_core::words::counted;
 
 use super::cloud_builder::CloudBuilder;
 use super::layout::RecordLayout;
+use super::line_end::{FindEnd, find_line_end};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
@@ -42,6 +43,8 @@ pub(crate) struct RowRange {
     pub n_columns: usize,
     /// Maximum number of rows; the lines after them are ignored.
     pub limit: Option<u64>,
+    /// Function that finds the ends of lines which may go on after a line feed; if absent, none do.
+    pub line_end: Option<FindEnd>,
 }
 
 /// The error of a line.
@@ -155,10 +158,10 @@ pub(crate) fn append_rows(
     let mut left = rows.limit.unwrap_or(u64::MAX);
     while !rest.is_empty() && 0 < left {
         progress.check()?;
-        let tasks = take_tasks(&mut rest);
+        let tasks = take_tasks(&mut rest, rows.line_end.unwrap_or(find_line_end));
         let n_bytes: usize = tasks.iter().map(|task| task.len()).sum();
         let firsts = first_lines(&tasks, line);
-        let parse_task = |(text, first)| parse_text(text, first, parse, rows.n_columns);
+        let parse_task = |(text, first)| parse_text(text, first, parse, rows);
         let parsed: Vec<Parsed> = tasks.into_par_iter().zip(firsts).map(parse_task).collect();
 
         let mut batch: Vec<Vec<u8>> = Vec::new();
@@ -166,10 +169,10 @@ pub(crate) fn append_rows(
             let n_rows = (parsed.records.len() / (8 * rows.n_columns)) as u64;
             if left <= n_rows {
                 parsed.records.truncate(left as usize * 8 * rows.n_columns);
-            } else if let Some(LineError { found, expected }) = parsed.error {
+            } else if let Some((number, LineError { found, expected })) = parsed.error {
                 batch.push(parsed.records);
                 builder.append(&batch)?;
-                let location = Location::Line(line + parsed.n_lines - 1);
+                let location = Location::Line(number);
                 return Err(input.malformed(location, found, expected, LINE_ADVICE));
             }
             left = left.saturating_sub(n_rows);
@@ -206,15 +209,17 @@ struct Parsed {
     records: Vec<u8>,
     /// Number of lines parsed, the broken one included.
     n_lines: u64,
-    error: Option<LineError>,
+    /// The number of the broken line and its error.
+    error: Option<(u64, LineError)>,
 }
 
 /// Takes whole lines from the front of `rest`, one part for each task.
-fn take_tasks<'a>(rest: &mut &'a [u8]) -> Vec<&'a [u8]> {
+fn take_tasks<'a>(rest: &mut &'a [u8], line_end: FindEnd) -> Vec<&'a [u8]> {
     let mut tasks = Vec::new();
     while !rest.is_empty() && tasks.len() < TASKS_PER_BATCH {
         let near = rest.len().min(BYTES_PER_TASK);
-        let end = memchr::memchr(b'\n', &rest[near..]).map_or(rest.len(), |at| near + at + 1);
+        let start = memchr::memrchr(b'\n', &rest[..near]).map_or(0, |at| at + 1);
+        let end = line_end(&rest[start..]).map_or(rest.len(), |length| start + length);
         let (task, after) = rest.split_at(end);
         tasks.push(task);
         *rest = after;
@@ -234,22 +239,26 @@ fn first_lines(tasks: &[&[u8]], line: u64) -> Vec<u64> {
 }
 
 /// Parses lines, the first of which has the number `first`.
-fn parse_text(text: &[u8], first: u64, parse: ParseLine, n_columns: usize) -> Parsed {
+fn parse_text(text: &[u8], first: u64, parse: ParseLine, rows: RowRange) -> Parsed {
+    let RowRange { n_columns, line_end, .. } = rows;
     let mut parsed = Parsed { records: Vec::new(), n_lines: 0, error: None };
     let mut row = Vec::new();
     let mut rest = text;
     while !rest.is_empty() {
-        let end = memchr::memchr(b'\n', rest);
-        let line = rest[..end.unwrap_or(rest.len())].trim_ascii();
-        rest = &rest[end.map_or(rest.len(), |end| end + 1)..];
+        let end = line_end.unwrap_or(find_line_end)(rest).unwrap_or(rest.len());
+        let (whole, after) = rest.split_at(end);
+        let line = whole.trim_ascii();
+        rest = after;
         let number = first + parsed.n_lines;
-        parsed.n_lines += 1;
+        let before_end = &whole[..end - 1];
+        let n_continued = line_end.map_or(0, |_| memchr::memchr_iter(b'\n', before_end).count());
+        parsed.n_lines += 1 + n_continued as u64;
         if line.is_empty() {
             continue;
         }
         row.clear();
         if let Err(error) = check_length(line).and_then(|()| parse(number, line, &mut row)) {
-            parsed.error = Some(error);
+            parsed.error = Some((number, error));
             break;
         }
         debug_assert!(row.is_empty() || row.len() == n_columns, "a row is complete or empty");

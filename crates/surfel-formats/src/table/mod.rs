@@ -8,13 +8,14 @@ mod layout;
 mod named_columns;
 mod reader;
 mod cloud_builder;
+mod line_end;
 mod line_reader;
 mod chunks;
 mod encode;
 
 pub use column_choice::{Column, ColumnChoice, TextColumn};
 
-pub(crate) use chunks::{ParseFault, TextChunk, find_line_end, line_at, parse_chunks};
+pub(crate) use chunks::{ParseFault, TextChunk, line_at, parse_chunks};
 pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
@@ -23,11 +24,12 @@ pub(crate) use encode::{
     POINTS_PER_CHUNK, decimal_step, encode_points, note_rounded_colors, scalar_word,
 };
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
+pub(crate) use line_end::{FindEnd, find_line_end};
 pub(crate) use line_reader::{
     LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, read_rows,
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
-    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching,
+    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching, note_kept,
     origin_of_records, read_records, sample_positions,
 };

@@ -7,13 +7,15 @@ use super::layout::{ColumnField, Field, NumberType};
 
 /// Returns columns with roles by their names, and with the scale of colours. Each field has a name.
 ///
-/// The range of floating-point colours and whether a column can hold classes also depend on the values in `sample`, the
-/// first records. Opacity is left out unless `choice` names it.
+/// The range of floating-point colours also depends on the values in `sample`, the first records. A column holds
+/// classes if all values in `sample` can be classes, and all in `records`, which may be more, can be classes or are
+/// missing. Opacity is left out unless `choice` names it.
 pub(crate) fn named_columns<'a>(
     fields: impl Iterator<Item = (&'a str, Field)>,
     stride: usize,
     big_endian: bool,
     sample: &[u8],
+    records: &[u8],
     choice: &ColumnChoice,
 ) -> Vec<ColumnField> {
     let keeps_alpha = choice.names("alpha");
@@ -30,8 +32,9 @@ pub(crate) fn named_columns<'a>(
     for (mut role, (name, mut field)) in ColumnRole::from_names(&names).into_iter().zip(fields) {
         let number_type = field.file_type;
         let holds_classes = || {
-            let records = sample.chunks_exact(stride);
-            records.into_iter().all(|record| is_byte(field.value(record, big_endian)))
+            let mut sample = sample.chunks_exact(stride);
+            sample.all(|record| is_byte(field.value(record, big_endian)))
+                && field.holds_classes(records, stride, big_endian)
         };
         if role == ColumnRole::Classification && number_type != NumberType::U8 && !holds_classes() {
             role = ColumnRole::Scalar(name.into());

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::column_slices::{ColumnSlices, grow, shrink};
 use super::layout::RecordLayout;
@@ -65,6 +66,18 @@ pub(crate) fn keep_matching(
         cloud.retain_from(start, &matches);
     }
     Ok(())
+}
+
+/// Reports how many points a filter keeps.
+pub(crate) fn note_kept(
+    input: &Input,
+    n_kept: u64,
+    n_points: u64,
+    filter: &PointFilter,
+    progress: &dyn Progress,
+) {
+    let points = counted(n_points, "point");
+    progress.note(&format!("{}: {n_kept} of {points} meet {}", input.name, filter.describe()));
 }
 
 /// Decodes all of `records` to the end of a cloud.

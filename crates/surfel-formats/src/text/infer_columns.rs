@@ -7,7 +7,9 @@ pub(super) fn infer_columns(
     sample: &[Vec<f64>],
     n_fields: usize,
 ) -> (Vec<Option<ColumnRole>>, String) {
-    let is_color = |first| (first..first + 3).all(|column| has_class_values(sample, column));
+    let has_bytes = |first| (first..first + 3).all(|column| has_class_values(sample, column));
+    // Normals along the axes are whole numbers, too.
+    let is_color = |first| has_bytes(first) && !has_unit_lengths(sample, first);
     let names: &[&str] = match n_fields {
         4 if counts_up(sample) => &["-", "x", "y", "z"],
         4 => &["x", "y", "z", "intensity"],
@@ -15,8 +17,8 @@ pub(super) fn infer_columns(
         6 if has_fractions_of_color(sample, 3) => &["x", "y", "z", "r", "g", "b"],
         6 => &["x", "y", "z", "nx", "ny", "nz"],
         // The order of PTS files takes precedence, because an intensity may look like a colour.
-        7 if is_color(4) => &["x", "y", "z", "intensity", "r", "g", "b"],
-        7 if is_color(3) => &["x", "y", "z", "r", "g", "b", "intensity"],
+        7 if has_bytes(4) => &["x", "y", "z", "intensity", "r", "g", "b"],
+        7 if has_bytes(3) => &["x", "y", "z", "r", "g", "b", "intensity"],
         9 if is_color(3) => &["x", "y", "z", "r", "g", "b", "nx", "ny", "nz"],
         9 if is_color(6) => &["x", "y", "z", "nx", "ny", "nz", "r", "g", "b"],
         _ => &["x", "y", "z"],
@@ -35,13 +37,17 @@ pub(super) fn infer_columns(
 
 /// Returns true if three columns have colours from 0 to 1: other than normals, they differ in length.
 fn has_fractions_of_color(sample: &[Vec<f64>], first: usize) -> bool {
-    let channels = |row: &Vec<f64>| [row[first], row[first + 1], row[first + 2]];
-    let is_color = |row: &Vec<f64>| channels(row).iter().all(|value| (0.0..=1.0).contains(value));
+    let mut values = sample.iter().flat_map(|row| &row[first..first + 3]);
+    values.all(|value| (0.0..=1.0).contains(value)) && !has_unit_lengths(sample, first)
+}
+
+/// Returns true if three columns have vectors of length 1.
+fn has_unit_lengths(sample: &[Vec<f64>], first: usize) -> bool {
     let is_unit = |row: &Vec<f64>| {
-        let squares: f64 = channels(row).iter().map(|value| value * value).sum();
+        let squares: f64 = row[first..first + 3].iter().map(|value| value * value).sum();
         (0.98..1.02).contains(&squares)
     };
-    sample.iter().all(is_color) && !sample.iter().all(is_unit)
+    !sample.is_empty() && sample.iter().all(is_unit)
 }
 
 /// Returns true if the first column numbers the points: whole numbers that grow from line to line, also over the parts of

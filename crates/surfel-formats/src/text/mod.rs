@@ -28,6 +28,10 @@ use separator::{Separator, comment};
 /// Coordinate system of longitudes and latitudes.
 const WGS84: &str = "EPSG:4326";
 
+/// Maximum bytes of a row, for each byte of a line that lacks fields. It bounds the memory of a file with a long header
+/// and short lines, and allows 48 columns in lines as short as `1 2 3`.
+const MAX_BYTES_PER_BYTE: usize = 64;
+
 /// Reads the lines before the points.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let preamble = read_preamble(input)?;
@@ -81,6 +85,7 @@ pub(crate) fn read(
         line: preamble.data_line,
         n_columns: kept.len(),
         limit: None,
+        line_end: None,
     };
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
     let mut salvage = Salvage::new(input, options.salvage);
@@ -254,7 +259,9 @@ fn parse_line(
     if preamble.separator.may_lack_fields(n_fields, columns.len()) {
         let is_axis = |role: &ColumnRole| matches!(role, ColumnRole::Position(_));
         let cells = &columns[n_fields..];
-        if !cells.iter().flatten().any(is_axis) {
+        let n_values = row.len() + cells.iter().flatten().count();
+        let is_in_proportion = n_values * size_of::<f64>() <= MAX_BYTES_PER_BYTE * (line.len() + 1);
+        if is_in_proportion && !cells.iter().flatten().any(is_axis) {
             row.extend(cells.iter().flatten().map(|_| f64::NAN));
             n_fields = columns.len();
         }

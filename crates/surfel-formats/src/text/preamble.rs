@@ -8,6 +8,8 @@ use crate::table::{ColumnRole, MAX_FIELDS, MAX_LINE_LENGTH};
 
 const ONE_POINT_PER_LINE: &str = "put each point on a line of its own";
 
+/// First bytes of texts in UTF-8 with a byte order mark.
+const UTF_8_MARK: &[u8] = b"\xef\xbb\xbf";
 /// First bytes of texts in UTF-16, of both byte orders.
 const UTF_16_MARKS: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
@@ -36,16 +38,16 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         return Err(input.malformed(Location::Byte(0), "text in UTF-16", "UTF-8", advice));
     }
     let mut header = HeaderLines::default();
-    let (mut at, mut line_number) = (0, 0);
+    // Some programs put a byte order mark before UTF-8.
+    let mut at = if input.starts_with(UTF_8_MARK) { UTF_8_MARK.len() } else { 0 };
+    let mut line_number = 0;
     while at < input.len() {
         let start = at;
         line_number += 1;
         let location = Location::Line(line_number);
         let line = line_at(input, at, &location)?;
         at += line.len();
-        // Some programs put a byte order mark before UTF-8.
         let line = line.trim_ascii();
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         let (text, is_comment) = match comment(line) {
             Some(text) => (text.trim_ascii(), true),
             None => (line, false),

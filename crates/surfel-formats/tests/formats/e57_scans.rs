@@ -309,3 +309,71 @@ fn claimed_points_without_bytes_are_rejected() {
     let error = read("a.e57", claimed);
     assert!(matches!(error, Err(Error::Truncated { readable: 1, claimed: 8, .. })));
 }
+
+#[test]
+fn invalid_colours_are_black_and_invalid_intensities_no_numbers() {
+    let flag = RecordDataType::Integer { min: 0, max: 1 };
+    let unit = RecordDataType::Single { min: Some(0.0), max: Some(1.0) };
+    let point = |color: i64, invalid_color: i64, intensity: f32, invalid_intensity: i64| {
+        let mut values = vec![RecordValue::Double(1.0); 3];
+        values.extend([color; 3].map(RecordValue::Integer));
+        values.push(RecordValue::Integer(invalid_color));
+        values.push(RecordValue::Single(intensity));
+        values.push(RecordValue::Integer(invalid_intensity));
+        values
+    };
+    let scan = Scan {
+        name: "hall",
+        pose: None,
+        prototype: vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+            Record::COLOR_RED_U8,
+            Record::COLOR_GREEN_U8,
+            Record::COLOR_BLUE_U8,
+            record(RecordName::IsColorInvalid, flag.clone()),
+            record(RecordName::Intensity, unit),
+            record(RecordName::IsIntensityInvalid, flag),
+        ],
+        points: vec![point(200, 0, 0.5, 1), point(200, 1, 0.25, 0)],
+    };
+    let cloud = read("a.e57", write(&[scan])).unwrap().cloud;
+    assert_eq!(cloud.colors, Some(vec![[200 * 257; 3], [0; 3]]));
+    let intensity = cloud.intensity.unwrap();
+    assert!(intensity[0].is_nan() && intensity[1] == 0.25, "{intensity:?}");
+    assert!(cloud.scalars.is_empty());
+}
+
+#[test]
+fn the_many_columns_of_a_small_scan_are_not_those_of_a_large_one() {
+    let axes = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+    let bit = RecordDataType::ScaledInteger { min: 0, max: 1, scale: 1.0, offset: 0.0 };
+    let column = |i: usize| {
+        let name = RecordName::Unknown { namespace: "nor".into(), name: format!("column{i}") };
+        record(name, RecordDataType::Double { min: None, max: None })
+    };
+    let n_columns = 200;
+    let mut wide = axes.clone().map(|axis| record(axis, bit.clone())).to_vec();
+    wide.extend((0..n_columns).map(column));
+    let corner = || vec![RecordValue::ScaledInteger(1); 3];
+    let file = write(&[
+        Scan {
+            name: "wide",
+            pose: None,
+            prototype: wide,
+            points: vec![[corner(), vec![RecordValue::Double(1.0); n_columns]].concat()],
+        },
+        Scan {
+            name: "long",
+            pose: None,
+            prototype: axes.map(|axis| record(axis, bit.clone())).to_vec(),
+            points: vec![corner(); 80_000],
+        },
+    ]);
+    let error = read("a.e57", &file).unwrap_err();
+    assert!(matches!(error, Error::OutOfMemory { n_points: 80_001, .. }), "{error}");
+    let options = LoadOptions { columns: ColumnChoice::Only(Vec::new()), ..LoadOptions::default() };
+    let cloud = load_bytes("a.e57", &file, &options, &NoProgress).unwrap().cloud;
+    assert_eq!(cloud.len(), 80_001);
+}

@@ -1,11 +1,15 @@
 //! Filters are applied while files of every format are read.
 
+use serde_json::json;
+use surfel_core::math::DVec3;
 use surfel_core::points::PointFilter;
 use surfel_core::progress::NoProgress;
-use surfel_formats::{Column, ColumnChoice, LoadOptions, load, load_bytes};
+use surfel_core::scene::Geometry;
+use surfel_formats::{Column, ColumnChoice, LoadOptions, load, load_bytes, load_graph_bytes};
 
 use crate::common::{Listener, encode_cloud, full_cloud, read, shared};
-use crate::{e57_writer, pcd, ptx};
+use crate::gltf_asset::{Asset, SQUARE, full_asset};
+use crate::{e57_writer, gltf, pcd, ptx};
 
 fn filtered(filter: &str) -> LoadOptions {
     let filter: PointFilter = filter.parse().unwrap();
@@ -28,6 +32,8 @@ fn every_format_keeps_the_same_points_as_a_filter_afterwards() {
         ("compressed.pcd", pcd::compressed_file(), "red > 0"),
         ("a.ptx", ptx::two_scans().into(), "intensity >= 0.75"),
         ("a.e57", e57_writer::small_file(), "z < 5 || y > 4900005"),
+        ("a.glb", two_clouds().glb(), "z > 0.5 && red > 100"),
+        ("a.gltf", gltf::embedded(&full_asset()), "z >= 1"),
     ];
     for (name, bytes, filter) in files {
         let whole = read(name, &bytes).unwrap().cloud;
@@ -42,6 +48,56 @@ fn every_format_keeps_the_same_points_as_a_filter_afterwards() {
         let line = format!("{} of {} points meet", kept.len(), whole.len());
         assert!(listener.has_note(&line), "{name}: {:?}", listener.notes);
     }
+}
+
+/// Returns a glTF scene of a square of points that two nodes show, the second one 10 units higher.
+fn two_clouds() -> Asset {
+    let mut asset = Asset::new();
+    let position = asset.numbers("VEC3", &SQUARE);
+    let colors = [[0u8, 0, 0, 255], [255; 4], [255, 0, 0, 255], [0, 0, 9, 255]];
+    let color = asset.numbers("VEC4", colors.as_flattened());
+    let attributes = json!({"POSITION": position, "COLOR_0": color});
+    let mut asset = asset.with_primitive(json!({"attributes": attributes, "mode": 0}));
+    let raised = asset.push("nodes", json!({"mesh": 0, "translation": [0, 10, 0]}));
+    asset.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(raised));
+    asset
+}
+
+#[test]
+fn the_clouds_of_a_scene_graph_are_filtered_in_world_coordinates() {
+    let shown = |filter: &str, columns: ColumnChoice| {
+        let options = LoadOptions { columns, ..filtered(filter) };
+        let bytes = two_clouds().glb();
+        let (graph, info) = load_graph_bytes("a.glb", &bytes, &options, &NoProgress).unwrap();
+        graph.validate();
+        let n_points = graph.geometries.iter().map(|geometry| geometry.positions().len());
+        let n_points: Vec<usize> = n_points.collect();
+        assert_eq!(info.n_points, Some(n_points.iter().sum::<usize>() as u64), "{filter}");
+        let parts = graph.nodes.iter().flat_map(|node| &node.primitives);
+        let parts: Vec<usize> = parts.map(|part| part.geometry).collect();
+        let has_colors = graph.geometries.iter().all(|geometry| match geometry {
+            Geometry::Points(cloud) => cloud.colors.is_some(),
+            Geometry::Triangles(_) => false,
+        });
+        (n_points, parts, has_colors)
+    };
+    let all = || ColumnChoice::All;
+    assert_eq!(shown("x < 0.5", all()), (vec![2], vec![0, 0], true));
+    assert_eq!(shown("z > 0.5", all()), (vec![2, 4], vec![0, 1], true));
+    assert_eq!(shown("z > 5", all()), (vec![4], vec![0], true));
+    assert_eq!(shown("z > 50", all()), (vec![0], vec![0], true));
+    let none = ColumnChoice::Only(Vec::new());
+    assert_eq!(shown("red > 100", none), (vec![2], vec![0, 0], false));
+}
+
+#[test]
+fn the_columns_and_the_origin_of_a_scene_are_those_of_the_options() {
+    let origin = Some(DVec3::new(1.0, 0.0, 5.0));
+    let columns = ColumnChoice::Only(Vec::new());
+    let options = LoadOptions { columns, origin, ..LoadOptions::default() };
+    let cloud = load_bytes("a.glb", &two_clouds().glb(), &options, &NoProgress).unwrap().cloud;
+    assert_eq!((Some(cloud.origin), cloud.colors.is_none(), cloud.len()), (origin, true, 8));
+    assert!((cloud.world_position(4) - DVec3::new(0.0, 0.0, 10.0)).length() < 1e-6);
 }
 
 #[test]

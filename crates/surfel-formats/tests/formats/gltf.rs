@@ -13,7 +13,7 @@ use crate::common::{Folder, Listener, shared};
 use crate::gltf_asset::{Asset, animated_asset, triangle};
 
 /// Returns the asset as JSON with its buffer in a Base64 `data:` URI.
-fn embedded(asset: &Asset) -> Vec<u8> {
+pub fn embedded(asset: &Asset) -> Vec<u8> {
     const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
     for chunk in asset.buffer.chunks(3) {

@@ -4,6 +4,7 @@ use serde_json::json;
 use surfel_core::math::{DVec3, Vec2, Vec3, Vec4};
 use surfel_core::scene::{Geometry, Primitive};
 
+use crate::common::read;
 use crate::gltf_asset::{Asset, SQUARE, square, triangle};
 
 fn vectors(values: &[f32]) -> Vec<Vec3> {
@@ -236,4 +237,30 @@ fn local_mesh_defects_are_repaired_and_reported() {
             .unwrap()
             .has_note("skipped 1 triangle with a corner that is not finite or beyond 1e15")
     );
+}
+
+#[test]
+fn the_vertices_of_a_mesh_keep_their_colours_as_points() {
+    let asset = square(|asset, primitive| {
+        let colors = asset.numbers("VEC3", &[1.0f32, 0.0, 0.5].repeat(4));
+        primitive["attributes"]["COLOR_0"] = colors.into();
+    });
+    let cloud = read("a.glb", asset.glb()).unwrap().cloud;
+    // Linear 0.5 is 0.7354 in sRGB.
+    assert_eq!(cloud.colors, Some(vec![[65535, 0, 48192]; 4]));
+}
+
+#[test]
+fn points_that_many_nodes_repeat_must_fit_in_memory() {
+    let mut asset = Asset::new();
+    // An accessor without a buffer view is of zeros.
+    let accessor = json!({"componentType": 5126, "type": "VEC3", "count": 1_000_000});
+    let position = asset.push("accessors", accessor);
+    let mut asset = asset.with_primitive(json!({"attributes": {"POSITION": position}, "mode": 0}));
+    for _ in 1..5000 {
+        let node = asset.push("nodes", json!({"mesh": 0}));
+        asset.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+    }
+    let error = read("a.glb", asset.glb()).unwrap_err().to_string();
+    assert!(error.contains("5000000000 points do not fit in memory"), "{error}");
 }

@@ -181,6 +181,47 @@ fn extra_bytes_keep_their_descriptions() {
 }
 
 #[test]
+fn missing_values_in_extra_bytes_are_no_numbers_and_stay_missing() {
+    let mut bytes = las_file((1, 1));
+    // A record of point format 1 has 28 bytes before the extra bytes, the first of which are the height.
+    let record = bytes.len() - 36;
+    bytes[record + 28..record + 30].fill(0xff);
+    let Loaded { cloud, info } = read("a.las", &bytes).unwrap();
+    let Some(Values::F32(heights)) = cloud.scalar("Height") else { panic!() };
+    let last = usize::from(N_POINTS) - 1;
+    assert!(heights[last].is_nan() && heights[1] == -4.99, "{:?}", &heights[last - 1..]);
+    let (_, points, _) = written_again(&cloud, &info, "las");
+    let expected = points_of(las::Reader::new(Cursor::new(bytes)).unwrap());
+    assert_eq!(points, expected);
+}
+
+#[test]
+fn the_geodetic_system_below_a_projected_one_is_not_that_of_the_file() {
+    let system = |keys: &[[u16; 4]]| {
+        let mut builder = Builder::from((1, 2));
+        let keys = [&[[1, 1, 0, keys.len() as u16]], keys].concat();
+        let keys: Vec<u8> = keys.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+        let texts = b"Site grid|NAD83|";
+        builder.vlrs =
+            vec![vlr("LASF_Projection", 34735, &keys), vlr("LASF_Projection", 34737, texts)];
+        let header = builder.into_header().unwrap();
+        let mut writer = Writer::new(Cursor::new(Vec::new()), header).unwrap();
+        writer.write_point(Point::default()).unwrap();
+        read("a.las", writer.into_inner().unwrap().into_inner()).unwrap().info.coordinate_system
+    };
+    let (projected, geographic) = ([1024, 0, 1, 1], [1024, 0, 1, 2]);
+    let (own, nad83) = ([3072, 0, 1, 32767], [2048, 0, 1, 4269]);
+    let (name, name_of_nad83) = ([3073, 34737, 10, 0], [2049, 34737, 6, 10]);
+    assert_eq!(system(&[projected, nad83, own, name]).as_deref(), Some("Site grid"));
+    assert_eq!(system(&[nad83, own, name]).as_deref(), Some("Site grid"));
+    assert_eq!(system(&[projected, nad83, name_of_nad83]), None);
+    assert_eq!(system(&[geographic, nad83]).as_deref(), Some("EPSG:4269"));
+    assert_eq!(system(&[nad83]).as_deref(), Some("EPSG:4269"));
+    let lambert = [3072, 0, 1, 2154];
+    assert_eq!(system(&[projected, nad83, lambert]).as_deref(), Some("EPSG:2154"));
+}
+
+#[test]
 fn changes_of_version_and_format_are_reported() {
     let expect = |kinds: Kind, change: &dyn Fn(&mut PointCloud), expected: Kind, reason: &str| {
         let Loaded { mut cloud, info } = read("a.las", las_file(kinds)).unwrap();

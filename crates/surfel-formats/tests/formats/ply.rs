@@ -111,6 +111,32 @@ fn classifications_must_be_small_integers() {
 }
 
 #[test]
+fn labels_above_255_after_the_first_records_are_not_clamped() {
+    let n = 100_000;
+    let header = |encoding: &str| {
+        format!(
+            "ply\nformat {encoding} 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n\
+            property float z\nproperty int label\nend_header\n"
+        )
+    };
+    let label = |i: usize| if i + 1 == n { 300 } else { i % 7 };
+    let records =
+        (0..n).flat_map(|i| [[0; 12].as_slice(), &(label(i) as i32).to_le_bytes()].concat());
+    let records: Vec<u8> = records.collect();
+    let lines: String = (0..n).map(|i| format!("0 0 0 {}\n", label(i))).collect();
+    for (name, file) in [
+        ("a.ply", binary(&header("binary_little_endian"), &records)),
+        ("b.ply", binary(&header("ascii"), lines.as_bytes())),
+        ("c.csv", format!("x y z classification\n{lines}").into_bytes()),
+    ] {
+        let cloud = read(name, file).unwrap().cloud;
+        assert_eq!(cloud.classification, None, "{name}");
+        let [labels] = &cloud.scalars[..] else { panic!("{name}: {:?}", cloud.scalars.len()) };
+        assert!((0..n).all(|i| labels.values.get(i) == label(i) as f64), "{name}");
+    }
+}
+
+#[test]
 fn large_coordinates_keep_their_precision_despite_nan() {
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n\
         property double x\nproperty double y\nproperty double z\nend_header\n";

@@ -14,6 +14,7 @@ fn separators_comments_and_headers_are_recognised() {
         "1\t2\t3\r\n4\t5\t6\r\n",
         "# made by hand\n1, 2, 3,\n// more\n4, 5, 6,\n",
         "\u{feff}X;Y;Z\n1;2;3\n4;5;6\n",
+        "\u{feff}1 2 3\n4 5 6\n",
         "//X Y Z\n1 2 3\n\n4 5 6\n",
         "\"x\",\"y\",\"z\"\n1,2,3\n4,5,6\n",
         "2\n1 2 3\n4 5 6\n",
@@ -81,6 +82,12 @@ fn columns_are_inferred_and_reported() {
     assert_eq!(guess("1 2 3 0 -1 0").normals, Some(vec![-Vec3::Y]));
     assert_eq!(guess("1 2 3 0.6 0 0.8").normals, Some(vec![Vec3::new(0.6, 0.0, 0.8)]));
     assert_eq!(guess("1 2 3 0.2 1 0").colors, Some(vec![[13107, 65535, 0]]));
+    let floor = guess("1 2 3 0 0 1\n2 2 3 0 0 1");
+    assert_eq!((floor.normals, floor.colors), (Some(vec![Vec3::Z; 2]), None));
+    let mixed = guess("1 2 3 0 0 1 0 0 255\n2 2 3 1 0 0 9 9 9");
+    assert_eq!(mixed.normals, Some(vec![Vec3::Z, Vec3::X]));
+    assert_eq!(mixed.colors.unwrap()[0], [0, 0, 65535]);
+    assert!(guess("1 2 3 0 0 1\n2 2 3 0 0 2").colors.is_some());
     let pts = guess("1 2 3 -700 1 2 3");
     assert_eq!((pts.intensity, pts.colors), (Some(vec![-700.0]), Some(vec![[257, 514, 771]])));
     let behind = guess("1 2 3 1 2 3 0.5");
@@ -256,6 +263,13 @@ fn obj_vertices_are_read_with_their_colours() {
     assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
     let colored = read("a.obj", "v 1 2 3 0 0.5 1\nv 1 2 3 1 1 1\n").unwrap().cloud;
     assert_eq!(colored.colors.unwrap()[0], [0, 32768, 65535]);
+    let mixed = "v 1 2 3 # a corner\nv 4 \\\n5 6 1 \\\r\n0 0 # red\nv 7 8 9 1.0\n";
+    let cloud = read("a.obj", mixed).unwrap().cloud;
+    let positions = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]];
+    assert_eq!(cloud.positions, positions.map(Vec3::from_array));
+    assert_eq!(cloud.colors, Some(vec![[0; 3], [65535, 0, 0], [0; 3]]));
+    let error = read("a.obj", "v 1 \\\n2 3\nv 1 \\\n2\nv 1 2 3\n").unwrap_err().to_string();
+    assert!(error.contains("line 3: found 2 numbers"), "{error}");
     let error = read("a.obj", "v 1 2 3\nv 1 2\n").unwrap_err().to_string();
     assert!(error.contains("line 2: found 2 numbers"), "{error}");
 }
@@ -275,4 +289,17 @@ fn names_may_have_units_and_tabs_may_separate_texts() {
     let german = "x,y,z,Rot,Gr\u{fc}n,Blau\n1,2,3,255,128,0\n";
     let colors = read("a.csv", german.as_bytes()).unwrap().cloud.colors;
     assert_eq!(colors, Some(vec![[65_535, 128 * 257, 0]]));
+}
+
+#[test]
+fn lines_may_lack_fields_only_in_proportion_to_their_length() {
+    let file = |n_columns: usize| {
+        let more: String = (3..n_columns).map(|i| format!("\tcolumn {i}")).collect();
+        format!("x (m)\ty (m)\tz (m){more}\n{}", "1\t2\t3\n".repeat(3))
+    };
+    let cloud = read("a.txt", file(40)).unwrap().cloud;
+    assert_eq!((cloud.len(), cloud.scalars.len()), (3, 37));
+    assert!(cloud.scalars[36].values.get(2).is_nan());
+    let error = read("a.txt", file(1000)).unwrap_err().to_string();
+    assert!(error.contains("line 2: found 3 fields, expected 1000 as in"), "{error}");
 }
