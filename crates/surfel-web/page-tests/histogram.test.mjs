@@ -2,7 +2,9 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { filterName, rangeIn, rangeOf, withRange } from '../page/histogram.js';
+import { filterName, histogramRows, rangeIn, rangeOf, withRange } from '../page/histogram.js';
+import { signal } from '../page/signal.js';
+import { fakeDocument } from './fake-dom.mjs';
 
 test('ranges are added to a filter, changed and removed', () => {
   let filter = withRange('', 'z', [3, null]);
@@ -50,4 +52,24 @@ test('a step is a limit for whole numbers, of ten digits too', () => {
   assert.deepEqual(rangeOf([2, 5], { low: 1, high: 6 }, 1), [2, 5]);
   const [low, high] = [1234567891, 1234567899];
   assert.deepEqual(rangeOf([low, high], { low, high }, 1), [null, null]);
+});
+
+test('a new connection keeps the chosen column if the data has it', () => {
+  fakeDocument();
+  const requested = [];
+  const request = ({ column }) => {
+    requested.push(column);
+    return new Promise(() => {});
+  };
+  const viewer = { info: { columns: ['x', 'z'] }, infoChanged: signal(), sceneChanged: signal(), request };
+  const [choice] = histogramRows(viewer)[0].all('select');
+  viewer.infoChanged();
+  assert.equal(choice.value, '');
+  choice.value = 'z';
+  viewer.infoChanged();
+  assert.equal(choice.value, 'z');
+  viewer.info = { columns: ['x'] };
+  viewer.infoChanged();
+  assert.equal(choice.value, '');
+  assert.deepEqual(requested, ['z']);
 });

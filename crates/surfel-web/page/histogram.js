@@ -121,8 +121,10 @@ export function histogramRows(viewer) {
   };
 
   viewer.infoChanged.listen(() => {
+    const chosen = choice.value;
     const names = ['', ...viewer.info.columns];
     choice.replaceChildren(...names.map((name) => element('option', { value: name }, name || 'none')));
+    choice.value = names.includes(chosen) ? chosen : '';
     request();
   });
   viewer.sceneChanged.listen(() => { if (viewer.scene) showFilter(); });

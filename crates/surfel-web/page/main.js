@@ -18,7 +18,6 @@ import { objectSection } from './object-controls.js';
 import { Overlay, pivotPainter } from './overlay.js';
 import { Panel, section } from './panel.js';
 import { PickCard } from './pick-card.js';
-import { ProfileCard } from './profile-card.js';
 import { Picture } from './picture.js';
 import { setUpPointer } from './pointer.js';
 import { setUpSceneLoading } from './scene-loading.js';
@@ -40,7 +39,6 @@ const viewport = document.getElementById('viewport');
 const overlay = new Overlay(document.getElementById('overlay'), viewer);
 const pickCard = new PickCard(viewer, overlay);
 const measureTool = new MeasureTool(viewer, overlay);
-const profileCard = new ProfileCard(viewer, overlay, measureTool);
 const viewHistory = new ViewHistory(viewer, measureTool);
 const cursorCoordinates = new CursorCoordinates(viewer);
 const crosshair = new Crosshair(viewer, overlay);
@@ -54,6 +52,13 @@ const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
 const openSaveDialog = whenNeeded(async () => (await import('./save-dialog.js')).setUpSaveDialog(viewer));
 const addFiles = whenNeeded(async () => (await import('./added-files.js')).setUpAddedFiles(viewer));
+/** The card of profiles, once one was opened. */
+let profileCard = null;
+const openProfile = whenNeeded(async () => {
+  const { ProfileCard } = await import('./profile-card.js');
+  profileCard = new ProfileCard(viewer, overlay, measureTool);
+  return (figure) => profileCard.open(figure);
+});
 const openPathCard = whenNeeded(async () => (await import('./path-card.js')).setUpPathCard(viewer, navigation));
 const openExportDialog = whenNeeded(async () => (await import('./export-dialog.js')).setUpExportDialog(viewer, viewHistory));
 
@@ -63,6 +68,7 @@ setUpLegend(viewer);
 setUpAxisCube(viewer, navigation);
 makeRoomForAnnotations(viewer);
 setUpVolumes(viewer, measureTool);
+measureTool.profileOpened.listen(openProfile);
 setUpSceneLoading(viewer, measureTool, addFiles);
 setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp, crosshair: showCrosshair });
 fillPanel();
@@ -108,7 +114,7 @@ setUpKeyboard(viewer, navigation, viewHistory, {
     else if (measureTool.isActive) measureTool.cancel();
     else if (viewer.tool !== 'navigate') viewer.selectTool('navigate');
     else if (pickCard.isOpen) pickCard.close();
-    else profileCard.close();
+    else profileCard?.close();
   },
 });
 

@@ -51,7 +51,7 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
       actions.hover(pixel, event);
       return;
     }
-    if (pointers.size === 2) pinch(event.pointerId, pixel);
+    if (pointers.size === 2 && !drag?.grabbed) pinch(event.pointerId, pixel);
     else if (pointers.size === 1) dragTo(pixel, event);
     pointers.set(event.pointerId, pixel);
   });
@@ -64,8 +64,8 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
     const { grabbed, isClick, start } = drag;
     drag = null;
     actions.hover(pixelOf(event), event);
-    if (grabbed) grabbed.end();
-    else if (isClick && event.type === 'pointerup' && start.button === 0) handleClick(pixelOf(event), start);
+    grabbed?.end();
+    if (isClick && event.type === 'pointerup' && start.button === 0) handleClick(pixelOf(event), start);
     else if (navigation.isActive) navigation.endInteraction();
   };
   viewport.addEventListener('pointerup', release);

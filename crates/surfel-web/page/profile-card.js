@@ -3,6 +3,7 @@
 import { download, element, iconButton } from './dom.js';
 import { count, counted, rounded, stemOf, withUnit } from './format.js';
 import { chartOf, levelLength, nearestPoint, positionsOf } from './profile.js';
+import { csvOf, svgOf } from './profile-files.js';
 import { showToast } from './toast.js';
 
 const POINT_SIZE = 2;
@@ -28,8 +29,10 @@ export class ProfileCard {
     this.canvas.addEventListener('pointermove', (event) => this.#mark({ x: event.offsetX, y: event.offsetY }));
     this.canvas.addEventListener('pointerleave', () => this.#mark(null));
     new ResizeObserver(() => this.#draw()).observe(this.canvas);
+    this.downloads = ['csv', 'svg'].map((format) => element('button', {
+      type: 'button', class: 'chip', onclick: () => this.#download(format),
+    }, format.toUpperCase()));
     overlay.add((view) => (this.#marked ? view.dot(this.#marked, 6, 'pick') : []));
-    measureTool.profileOpened.listen((figure) => this.open(figure));
     measureTool.figuresShown.listen(() => this.#follow());
     viewer.sceneChanged.listen(() => {
       clearTimeout(this.#timer);
@@ -38,7 +41,7 @@ export class ProfileCard {
   }
 
   open(figure) {
-    this.#figure = figure;
+    this.#clear(figure);
     const width = element('input', {
       type: 'number', min: 0, step: 'any', value: Number(figure.width.toPrecision(3)), 'aria-label': 'Width of the strip',
       onchange: () => 0 < width.valueAsNumber && this.measureTool.replace(this.#figure, { ...this.#figure, width: width.valueAsNumber }),
@@ -46,8 +49,7 @@ export class ProfileCard {
     this.card.replaceChildren(
       element('header', {}, element('h2', {}, figure.name),
         element('label', {}, 'Width ', width),
-        element('button', { type: 'button', class: 'chip', onclick: () => this.#download('csv') }, 'CSV'),
-        element('button', { type: 'button', class: 'chip', onclick: () => this.#download('svg') }, 'SVG'),
+        ...this.downloads,
         iconButton('close', 'Close', () => this.close())),
       this.canvas, this.readout);
     this.card.hidden = false;
@@ -56,9 +58,19 @@ export class ProfileCard {
   }
 
   close() {
-    [this.#figure, this.#profile, this.#marked] = [null, null, null];
+    this.#clear(null);
     this.card.hidden = true;
     document.body.classList.remove('has-profile');
+  }
+
+  /** Shows nothing until there is an answer for this figure. */
+  #clear(figure) {
+    this.#figure = figure;
+    this.#profile = this.#chart = this.#marked = null;
+    // A canvas whose size is set is empty.
+    this.canvas.width = 0;
+    this.readout.textContent = this.summary = '';
+    for (const button of this.downloads) button.disabled = true;
     this.overlay.redraw();
   }
 
@@ -78,6 +90,7 @@ export class ProfileCard {
       const { profile } = await this.viewer.request({ type: 'profile', points, width, up: this.viewer.info.up });
       if (this.#figure !== figure) return;
       this.#profile = profile;
+      for (const button of this.downloads) button.disabled = false;
       this.#draw();
     } catch (error) {
       showToast(error.message);
@@ -129,9 +142,7 @@ export class ProfileCard {
     this.overlay.redraw();
   }
 
-  async #download(format) {
-    const { csvOf, svgOf } = await import('./profile-files.js');
-    if (!this.#profile) return;
+  #download(format) {
     const { info } = this.viewer;
     const contents = {
       csv: () => csvOf(this.#profile, this.#figure.points, info.up),

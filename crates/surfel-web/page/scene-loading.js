@@ -11,10 +11,12 @@ const ADDED = 'added files';
 /** `addFiles` adds files to the view. */
 export function setUpSceneLoading(viewer, measureTool, addFiles) {
   const load = (files) => {
-    const [scene] = [...files].filter(isSceneFile);
+    const [scene, ...otherScenes] = [...files].filter(isSceneFile);
     const others = [...files].filter((file) => !isSceneFile(file));
     if (scene) viewer.loadScene(scene);
+    if (otherScenes.length) showToast(`${namesOf(otherScenes)}: only one scene file is shown`);
     if (others.length && viewer.isConnected) addFiles(others);
+    else if (others.length) showToast(`${namesOf(others)}: there is no connection`);
   };
   const input = document.getElementById('scene-file');
   input.addEventListener('change', () => {
@@ -43,7 +45,9 @@ export function setUpSceneLoading(viewer, measureTool, addFiles) {
   if (lost) showToast(`${lost}: added to the page, and not kept when it is loaded again. Add it again.`);
   sessionStorage.removeItem(ADDED);
   window.addEventListener('pagehide', () => {
-    const names = viewer.addedObjects.map(({ name }) => name).join(', ');
+    const names = namesOf(viewer.addedObjects);
     if (names) sessionStorage.setItem(ADDED, names);
   });
 }
+
+const namesOf = (files) => files.map(({ name }) => name).join(', ');

@@ -1,20 +1,17 @@
 //! Adds a file to a page's view: makes room for it, receives its bytes, and has them read.
 
 use crate::added_files::{PageFiles, UploadGuard};
-use crate::long_work::run_at_once;
+use crate::long_work::{CANCEL_POLL_INTERVAL, run_at_once};
 use crate::outgoing::{Outgoing, send_json};
 use crate::scene_provider::{Error, Result, SceneProvider, SentFile};
 use crate::server_state::ServerState;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use surfel_core::progress::Progress;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
-
-/// Time between two looks at whether a page has cancelled its upload.
-const CANCEL_POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A file that a page is about to send.
 pub struct Announcement {

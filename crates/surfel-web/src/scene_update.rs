@@ -14,7 +14,7 @@ use std::time::Instant;
 use surfel_core::progress::Progress;
 use tokio::sync::mpsc;
 
-/// Prepares scenes for a page until the task is aborted.
+/// Prepares scenes for a page until it has gone, the server stops, or the task is aborted.
 pub async fn run(
     state: Arc<ServerState>,
     client: Arc<Client>,
@@ -31,7 +31,8 @@ pub async fn run(
     let shows_preview = false;
     let mut updater =
         SceneUpdater { state, client, pending, out, provider, settings, shows_preview };
-    loop {
+    // Nothing would be prepared any more: the change would be cancelled and taken again without end.
+    while !updater.out.is_closed() && !updater.state.is_stopped() {
         let change = updater.pending.take().await;
         updater.show_preview(&change).await;
         updater.apply(change).await;

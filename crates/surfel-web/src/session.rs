@@ -56,10 +56,20 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 out.clone(),
             ));
             let queries = Arc::new(Semaphore::new(state.limits.max_page_queries));
+            let save_permit = Arc::new(Semaphore::new(1));
             let saves = HashMap::new();
             let (download, files) = (Arc::default(), Arc::default());
-            let mut session =
-                Session { state, client, pending, out, queries, saves, download, files };
+            let mut session = Session {
+                state,
+                client,
+                pending,
+                out,
+                queries,
+                save_permit,
+                saves,
+                download,
+                files,
+            };
             session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
             session.saves.values().for_each(cancel);
@@ -83,6 +93,8 @@ struct Session {
     out: mpsc::Sender<Outgoing>,
     /// One permit for each question about points that is being answered.
     queries: Arc<Semaphore>,
+    /// The permit for the saved picture or file of points that is being made; others of the page wait for it.
+    save_permit: Arc<Semaphore>,
     /// The cancellation flags of saved pictures and files of points that are not sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
     /// The file of points that the page requested last.
@@ -341,12 +353,12 @@ impl Session {
         };
         let is_cancelled: Arc<AtomicBool> = Arc::default();
         self.saves.insert(id, is_cancelled.clone());
-        let (state, out) = (self.state.clone(), self.out.clone());
+        let (state, out, permit) = (self.state.clone(), self.out.clone(), self.save_permit.clone());
         tokio::spawn(async move {
             let render = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
                 provider.render_png(&provider.drawable_settings(&settings), progress)
             };
-            let png = run_slowly(&state, id, is_cancelled.clone(), &out, render).await;
+            let png = run_slowly(&state, &permit, id, is_cancelled.clone(), &out, render).await;
             let message = match png {
                 Ok(png) => {
                     let bytes = frame::saved_message(id, (width as u16, height as u16), &png);
@@ -399,11 +411,12 @@ impl Session {
         let is_cancelled: Arc<AtomicBool> = Arc::default();
         self.saves.insert(id, is_cancelled.clone());
         let (state, out, download) = (self.state.clone(), self.out.clone(), self.download.clone());
+        let permit = self.save_permit.clone();
         tokio::spawn(async move {
             let write = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
                 write(provider, &settings, progress)
             };
-            let written = run_slowly(&state, id, is_cancelled, &out, write).await;
+            let written = run_slowly(&state, &permit, id, is_cancelled, &out, write).await;
             let kept = written.and_then(|file| {
                 let guard = state.downloads.add(file.clone());
                 let text = "the system has no random numbers";

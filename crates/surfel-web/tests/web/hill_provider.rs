@@ -364,6 +364,7 @@ fn render_settings(seed: u64) -> Settings {
         width: PICTURE_SIZE.0,
         height: PICTURE_SIZE.1,
         samples_per_pixel: N_SAMPLES,
+        noise_threshold: 0.0,
         light_samples: 1,
         max_depth: 2,
         seed,

@@ -2,8 +2,9 @@
 
 use crate::http_client::get;
 use crate::test_page::{Received, SAVED, TestPage};
-use crate::test_server::TestServer;
+use crate::test_server::{TestServer, wait_until};
 use serde_json::{Value, json};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 #[tokio::test]
@@ -177,6 +178,31 @@ async fn saves_report_progress_and_can_be_cancelled() {
     page.message("scene").await;
     page.send_json(save(4)).await;
     page.wait_for_picture(|picture| picture.kind == SAVED && picture.number == 4).await;
+}
+
+#[tokio::test]
+async fn a_page_saves_one_picture_after_the_other_and_leaves_room_for_other_pages() {
+    let server = TestServer::start();
+    let mut busy = TestPage::open(&server, json!({ "slow_render": 100 })).await;
+    busy.finished_picture().await;
+    let save = |id: u32| json!({ "type": "save", "id": id, "width": 30, "height": 20 });
+    for id in [1, 2] {
+        busy.send_json(save(id)).await;
+    }
+    wait_until(|| server.provider.n_started.load(Ordering::Relaxed) == 1).await;
+    let mut other = TestPage::open(&server, json!({})).await;
+    other.finished_picture().await;
+    other.send_json(save(7)).await;
+    other.wait_for_picture(|picture| picture.kind == SAVED && picture.number == 7).await;
+    // A save that waits for another is cancelled at once, and another one may wait.
+    for waiting in [2, 3] {
+        busy.send_json(json!({ "type": "cancel", "id": waiting })).await;
+        let error = busy.message("error").await;
+        assert_eq!((&error["id"], &error["text"]), (&json!(waiting), &json!("cancelled")));
+        busy.sync().await;
+        busy.send_json(save(waiting + 1)).await;
+    }
+    assert_eq!(server.provider.n_started.load(Ordering::Relaxed), 1);
 }
 
 #[tokio::test]
