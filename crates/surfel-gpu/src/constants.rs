@@ -13,22 +13,25 @@ use crate::numbers::miss;
 use crate::numbers::queue;
 use crate::numbers::texture;
 use crate::numbers::{
-    BAND_HEIGHT, MAX_PLANES, NODE_VECTORS, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number,
+    BAND_HEIGHT, MAX_PLANES, NO_LIMIT, NODE_VECTORS, NONE, TRIANGLE, WORKGROUP_SIZE, align_number,
+    surface_number,
 };
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
 use surfel_core::integrator::constants as integrator;
+use surfel_core::math::MIN_DIRECTION;
 use surfel_core::math::eigen_lanes as eigen;
 use surfel_core::points::{CAPSULE_ASPECT, HARMONIC_0};
 use surfel_core::surface::align;
+use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
 use surfel_core::surface::gaussian;
 use surfel_core::surface::mls;
 use surfel_core::surface::smooth;
 use surfel_core::surface::{
-    Align, FIELD_SUPPORT, FIT_REACH, MAX_GATHERED, MIN_FIELD_WEIGHT, NEIGHBORHOOD_RADIUS_FACTOR,
-    SOLID_SPAWN_OFFSET, SUPPORT_FACTOR, SurfaceKind,
+    Align, FIELD_SUPPORT, FIT_REACH, MAX_GATHERED, MIN_DISC_WEIGHT, MIN_FIELD_WEIGHT,
+    NEIGHBORHOOD_RADIUS_FACTOR, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR, SurfaceKind,
 };
 use surfel_core::trace::constants as trace;
 
@@ -118,6 +121,7 @@ fn numbers() -> Vec<(&'static str, u32)> {
 
 fn limits() -> Vec<(&'static str, u32)> {
     vec![
+        ("NONE", NONE),
         ("WORKGROUP_SIZE", WORKGROUP_SIZE),
         ("BAND_HEIGHT", BAND_HEIGHT),
         ("MAX_PLANES", MAX_PLANES as u32),
@@ -169,7 +173,13 @@ fn dimensions() -> Vec<(&'static str, u32)> {
 
 fn floats() -> Vec<(&'static str, f32)> {
     vec![
+        ("NO_LIMIT", NO_LIMIT),
+        ("EPSILON", f32::EPSILON),
+        ("ROUNDING", trace::ROUNDING),
+        ("MIN_DIRECTION", MIN_DIRECTION),
         ("CAPSULE_ASPECT", CAPSULE_ASPECT),
+        ("MIN_ACROSS", capsule::MIN_ACROSS),
+        ("MIN_DISC_WEIGHT", MIN_DISC_WEIGHT),
         ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
         ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
         ("MIN_SPREAD", eigen::MIN_SPREAD),
@@ -221,6 +231,7 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("EDGE_MAX_PLANE_DISTANCE", edge_test::MAX_PLANE_DISTANCE),
         ("MIN_PASSED_DISTANCE", edge_test::MIN_PASSED_DISTANCE),
         ("MAX_BACKFACE_COSINE", edge_test::MAX_BACKFACE_COSINE),
+        ("MIN_SQUARED_OFFSET", edge_test::MIN_SQUARED_OFFSET),
         ("HEIGHT_STEPS", edge_test::HEIGHT_STEPS),
         ("TIE_BREAK_ANGLE", edge_test::TIE_BREAK_ANGLE),
         ("RETRY_RADIUS_FACTOR", trace::RETRY_RADIUS_FACTOR),
@@ -233,6 +244,7 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("MAX_LAST_STEP", trace::MAX_LAST_STEP),
         ("SUPPORT_FACTOR", SUPPORT_FACTOR),
         ("FIT_REACH", FIT_REACH),
+        ("MIN_GRADIENT", smooth::MIN_GRADIENT),
         ("FIT_STEPS", smooth::STEPS),
         ("FIT_MIN_WEIGHT", smooth::MIN_WEIGHT),
         ("NEAREST_COLOR_WEIGHT", smooth::NEAREST_COLOR_WEIGHT),
@@ -246,6 +258,10 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("MAX_OVERHANG", smooth::MAX_OVERHANG),
         ("MAX_STEP", smooth::MAX_STEP),
         ("MIN_FACING_COS", integrator::MIN_FACING_COS),
+        ("MIN_OFFSET_COS", integrator::MIN_OFFSET_COS),
+        ("MIN_GGX_ALPHA", integrator::MIN_GGX_ALPHA),
+        ("MIN_GGX_COS", integrator::MIN_GGX_COS),
+        ("MIN_MASKING_COS", integrator::MIN_MASKING_COS),
         ("MIN_ROUGHNESS", integrator::MIN_ROUGHNESS),
         ("MIN_WEIGHT", integrator::MIN_WEIGHT),
         ("MIN_TRANSMITTANCE", integrator::MIN_TRANSMITTANCE),

@@ -329,7 +329,7 @@ impl Job<'_> {
     /// Waits for a part, adds it to the picture, and learns from its time how large those to come should be.
     fn take_part(&self, part: Part, picture: &mut Picture) -> surfel_core::Result<()> {
         let Part { first, n_pixels, start, readback } = part;
-        let is_opaque = matches!(self.scene.background, Background::Gradient { .. });
+        let is_opaque = self.scene.background != Background::Transparent;
         let background_alpha = if is_opaque { 1.0 } else { 0.0 };
         let set = |colors: &[[f32; 4]]| {
             set_pixels(&mut picture.image, colors, first as usize, background_alpha);

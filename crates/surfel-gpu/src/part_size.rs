@@ -3,8 +3,11 @@
 use crate::device::DeviceKind;
 use crate::numbers::WORKGROUP_SIZE;
 use crate::shader::Kernel;
+use crate::upload::is_same;
 use std::collections::BTreeSet;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
+use surfel_core::flat::FlatGeometry;
 
 /// Number of pixels of the first part that a device renders.
 const FIRST_PART: u32 = 1 << 16;
@@ -19,20 +22,36 @@ const TARGET_SAMPLE_TIME: Duration = Duration::from_millis(100);
 /// Maximum growth from one part to the next.
 const MAX_GROWTH: f64 = 8.0;
 
-/// The number of pixels of a part, for pictures that these kernels render.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The number of pixels of a part, for pictures of these geometries that these kernels render.
+#[derive(Clone, Debug)]
 pub struct PartSize {
     /// The kernels.
-    pub kernels: BTreeSet<Kernel>,
+    kernels: BTreeSet<Kernel>,
+    /// The geometries. With others a pixel may take a hundred times as long: a part of as many pixels may then exceed
+    /// the time after which the system takes the device away.
+    geometries: Vec<Weak<FlatGeometry>>,
     /// The number of pixels.
     pub n_pixels: u32,
 }
 
 impl PartSize {
-    /// Returns the size of the first part of a picture: that of the last part if the same kernels rendered it.
-    pub fn first(kind: DeviceKind, known: Option<Self>, kernels: BTreeSet<Kernel>) -> Self {
-        let known = known.filter(|known| known.kernels == kernels);
-        Self { n_pixels: first_part(kind, known.map(|known| known.n_pixels)), kernels }
+    /// Returns the size of the first part of a picture: that of the last part if the same kernels rendered the same
+    /// geometries.
+    pub fn first(
+        kind: DeviceKind,
+        known: Option<Self>,
+        kernels: BTreeSet<Kernel>,
+        geometries: &[Arc<FlatGeometry>],
+    ) -> Self {
+        let known = known.filter(|known| known.kernels == kernels && known.has(geometries));
+        let n_pixels = first_part(kind, known.map(|known| known.n_pixels));
+        Self { kernels, geometries: geometries.iter().map(Arc::downgrade).collect(), n_pixels }
+    }
+
+    /// Returns true if the size is that of pictures of these geometries.
+    fn has(&self, geometries: &[Arc<FlatGeometry>]) -> bool {
+        self.geometries.len() == geometries.len()
+            && self.geometries.iter().zip(geometries).all(|(known, other)| is_same(known, other))
     }
 }
 
@@ -62,6 +81,8 @@ mod tests {
     //! Parts grow while they are fast and shrink once they are slow.
 
     use super::*;
+    use crate::test_support::scene_of_points;
+    use surfel_core::surface::SurfaceKind;
 
     fn next(wanted: u32, n_pixels: u32, millis: u64) -> u32 {
         next_part(wanted, n_pixels, Duration::from_millis(millis))
@@ -91,12 +112,24 @@ mod tests {
     }
 
     #[test]
-    fn other_kernels_begin_with_a_small_part() {
+    fn other_kernels_and_geometries_begin_with_a_small_part() {
         let shade = BTreeSet::from([Kernel::Shade]);
-        let known = PartSize { kernels: shade.clone(), n_pixels: 1 << 20 };
-        let first = |kernels| PartSize::first(DeviceKind::Discrete, Some(known.clone()), kernels);
-        assert_eq!(first(shade), known);
-        assert_eq!(first(BTreeSet::from([Kernel::NextDisc])).n_pixels, FIRST_PART);
+        let light = scene_of_points(SurfaceKind::Disc).geometries;
+        let heavy = scene_of_points(SurfaceKind::Disc).geometries;
+        let known = PartSize {
+            kernels: shade.clone(),
+            geometries: light.iter().map(Arc::downgrade).collect(),
+            n_pixels: 1 << 20,
+        };
+        let first = |kernels: &BTreeSet<Kernel>, geometries: &[Arc<FlatGeometry>]| {
+            let (known, kernels) = (Some(known.clone()), kernels.clone());
+            PartSize::first(DeviceKind::Discrete, known, kernels, geometries).n_pixels
+        };
+        assert_eq!(first(&shade, &light), 1 << 20);
+        assert_eq!(first(&BTreeSet::from([Kernel::NextDisc]), &light), FIRST_PART);
+        assert_eq!(first(&shade, &heavy), FIRST_PART);
+        assert_eq!(first(&shade, &[]), FIRST_PART);
+        assert_eq!(first(&shade, &[light, heavy].concat()), FIRST_PART);
     }
 
     #[test]

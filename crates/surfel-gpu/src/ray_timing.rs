@@ -16,7 +16,7 @@ use crate::shader::Kernel;
 use crate::submitter::{Bound, Submitter, bind_trees};
 use crate::surface::Surface;
 use crate::tree_visits::lone_visit;
-use crate::unsupported::trees;
+use crate::unsupported::{surface_name, trees};
 use crate::upload::{GpuTree, TreeRef, Uploads};
 use crate::wavefront::{Arrays, Capacities, Contents, Wavefront, written};
 use bytemuck::Zeroable;
@@ -247,6 +247,6 @@ pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()
     if query != TimedQuery::Surface || Surface::of_kind(cloud.surface, cloud).is_some() {
         return Ok(());
     }
-    let reason = format!("the GPU has no benchmark of the surface {}", cloud.surface.name());
+    let reason = format!("the GPU has no benchmark of {}", surface_name(cloud));
     Err(Error::Device { device: gpu.info.name.clone(), reason })
 }

@@ -179,7 +179,8 @@ impl Renderer for GpuRenderer {
             words,
         };
         let kernels = job.passes.all().map(|pass| pass.kernel).collect();
-        let first_part = PartSize::first(gpu.info.kind, part_size.take(), kernels);
+        let known = part_size.take();
+        let first_part = PartSize::first(gpu.info.kind, known, kernels, &scene.geometries);
         let part_size = &mut part_size.insert(first_part).n_pixels;
         let state = RendererState { arrays, times, part_size };
         let (image, stats) = job.render(state, progress)?;
@@ -192,8 +193,11 @@ mod tests {
     //! A lost device is an error, memory is shared well, and kernels are measured.
 
     use super::*;
-    use crate::test_support::{empty_scene, open_renderer, report_skipped, scene_of_points};
+    use crate::test_support::{
+        empty_scene, open_renderer, report_skipped, scene_of_lit_points, scene_of_points,
+    };
     use surfel_core::Error as CoreError;
+    use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
     use surfel_core::surface::SurfaceKind;
 
@@ -250,6 +254,21 @@ mod tests {
             assert_eq!(state.arrays.as_ref().unwrap().sizes(), sizes);
         }
         assert_eq!(renderer.upload_time().n_bytes, 3 * tree_bytes);
+    }
+
+    #[test]
+    fn sums_of_bright_pixels_do_not_wrap_around() {
+        let Some(renderer) = open_renderer() else { return };
+        // Each sample adds 2^24, so that 256 of them would reach 2^32. Sums end at 2^31.
+        let scene = scene_of_lit_points(SurfaceKind::Sphere, Vec3::splat(1e8));
+        let (width, height, samples_per_pixel) = (16, 8, 256);
+        let settings = Settings { width, height, samples_per_pixel, ..Settings::default() };
+        let (image, _) = renderer.render(&scene, &settings, &NoProgress).unwrap();
+        assert!(image.coverage.iter().any(|coverage| 0.5 < *coverage));
+        for (coverage, color) in image.coverage.iter().zip(&image.color) {
+            let expected = coverage.min(0.5) * (1 << 24) as f32;
+            assert_eq!(color[..3], [expected; 3], "{coverage}");
+        }
     }
 
     #[test]

@@ -141,8 +141,12 @@ const WITHIN_RIMS: &[&str] = parts!["trace/query/within_rims.wgsl"];
 const FACING: &[&str] = parts!["trace/query/facing.wgsl"];
 const ANY_SURFACE: &[&str] = parts!["trace/query/any_surface.wgsl"];
 const EDGE_FILTER: &[&str] = parts!["trace/query/edge_filter.wgsl"];
-const SMOOTH: &[&str] =
-    parts!["surface/smooth.wgsl", "trace/query/damped.wgsl", "trace/query/smooth_query.wgsl",];
+const SMOOTH: &[&str] = parts![
+    "surface/weight.wgsl",
+    "surface/smooth.wgsl",
+    "trace/query/damped.wgsl",
+    "trace/query/smooth_query.wgsl",
+];
 const SMOOTH_DISC: &[&str] = parts!["trace/query/smooth_disc.wgsl"];
 const SLOT: &[&str] = parts!["render/slot.wgsl"];
 const NEARER: &[&str] = parts!["trace/nearer.wgsl"];
@@ -154,12 +158,14 @@ const SMOOTH_SURFACE: &[&str] =
     parts!["trace/query/passed_disc.wgsl", "trace/query/smooth_surface.wgsl"];
 const MLS: &[&str] = parts![
     "math/eigen.wgsl",
+    "surface/weight.wgsl",
     "surface/mls.wgsl",
     "trace/query/damped.wgsl",
     "trace/query/mls_query.wgsl",
     "trace/query/mls_surface.wgsl",
 ];
 const IMPLICIT: &[&str] = parts![
+    "surface/weight.wgsl",
     "surface/field.wgsl",
     "flat/field/kd_tree.wgsl",
     "trace/traversal/kd_walk.wgsl",

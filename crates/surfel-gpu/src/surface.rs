@@ -69,6 +69,7 @@ impl Surface {
             SurfaceKind::Disc => Some(Self::Disc),
             SurfaceKind::Splat | SurfaceKind::SplatMean => Some(Self::Splat),
             SurfaceKind::Smooth => Some(Self::Smooth),
+            SurfaceKind::SplatFit if cloud.fits_balls() => None,
             SurfaceKind::SplatFit => Some(Self::SplatFit),
             SurfaceKind::Cylinder => Some(Self::Cylinder),
             SurfaceKind::Mls if options.degree == 1 => Some(Self::Mls(1)),

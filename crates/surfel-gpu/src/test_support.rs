@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::renderer::GpuRenderer;
 use surfel_core::flat::FlatScene;
 use surfel_core::math::{DVec3, Vec3};
-use surfel_core::points::{PointCloud, Preparation, prepare};
+use surfel_core::points::{PointCloud, Preparation, StructureChoice, prepare};
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::{
     Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
@@ -45,15 +45,40 @@ pub fn empty_scene() -> FlatScene {
 
 /// Returns a scene of 400 points with this surface.
 pub fn scene_of_points(surface: SurfaceKind) -> FlatScene {
+    scene_of_prepared(surface, &Preparation::default(), Material::MATTE)
+}
+
+/// Returns the scene of [`scene_of_points`] without normals, lines and scatter.
+pub fn scene_of_points_without_normals(surface: SurfaceKind) -> FlatScene {
+    let preparation = Preparation { estimates_normals: false, ..one_surface() };
+    scene_of_prepared(surface, &preparation, Material::MATTE)
+}
+
+/// Returns the scene of [`scene_of_points`] without lines and scatter, of points that emit this radiance.
+pub fn scene_of_lit_points(surface: SurfaceKind, emissive: Vec3) -> FlatScene {
+    let material = Material { emissive, ..Material::MATTE };
+    scene_of_prepared(surface, &one_surface(), material)
+}
+
+/// Returns settings by which all points form a surface.
+fn one_surface() -> Preparation {
+    Preparation { structure: StructureChoice::Surface, ..Preparation::default() }
+}
+
+fn scene_of_prepared(
+    surface: SurfaceKind,
+    preparation: &Preparation,
+    material: Material,
+) -> FlatScene {
     let position = |i: u16| {
         let (x, y) = (f32::from(i % 20), f32::from(i / 20));
         Vec3::new(x, y, (x * y).sin())
     };
     let cloud = PointCloud::from_positions((0..400).map(position).collect());
-    let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+    let (cloud, _) = prepare(cloud, preparation, &NoProgress).unwrap();
     let mut points = CloudGeometry::with_uniform_color(cloud, [200; 3]);
     points.surface = surface;
-    scene_of(Graph::from_geometry(Geometry::Points(points), Material::MATTE))
+    scene_of(Graph::from_geometry(Geometry::Points(points), material))
 }
 
 fn scene_of(graph: Graph) -> FlatScene {

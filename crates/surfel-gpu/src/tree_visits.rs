@@ -2,7 +2,7 @@
 
 use crate::gaussian_arrays::gaussian_ranges;
 use crate::mesh_blocks::{attributes, block_vectors};
-use crate::numbers::{NODE_VECTORS, TRIANGLE, align_number, attribute, surface_number};
+use crate::numbers::{NO_LIMIT, NODE_VECTORS, TRIANGLE, align_number, attribute, surface_number};
 use crate::records::Visit;
 use crate::surface::Surface;
 use crate::unsupported::trees;
@@ -143,7 +143,12 @@ fn visit(placement: Visit, cloud: &FlatCloud, kind: SurfaceKind) -> Visit {
         // The structure of the surface follows the nodes.
         first_vector: (cloud.points.nodes.len() * NODE_VECTORS) as u32,
         radius_factor: if is_surface { cloud.radius_factor() } else { 1.0 },
-        max_blend_distance: if is_surface { cloud.max_blend_distance } else { 0.0 },
+        // Added to any other distance, it stays a finite number.
+        max_blend_distance: if is_surface {
+            cloud.max_blend_distance.min(0.1 * NO_LIMIT)
+        } else {
+            0.0
+        },
         edge_retest_factor: cloud.edge_retest_factor,
         has_edge_test: (cloud.edge_test == EdgeTest::AngularGap).into(),
         has_front_sides: cloud.has_front_sides.into(),

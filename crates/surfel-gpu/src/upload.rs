@@ -214,7 +214,8 @@ impl Uploads {
     }
 }
 
-fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
+/// Returns true if a weak reference is one to this geometry, as it was then.
+pub fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
     // A weak reference keeps its address from being used again.
     known.as_ptr() == Arc::as_ptr(geometry)
 }

@@ -247,10 +247,9 @@ struct Tables {
     albedo: array<vec4<f32>, N_ALBEDO_VECTORS>,
 }
 
-const NONE: u32 = 0xffffffffu;
-// The distance beyond which there is nothing, instead of infinity.
-const NO_LIMIT: f32 = 3e38;
-const EPSILON: f32 = 1.1920929e-7;
+
+// The upper word of a sum of a pixel from which on the sum stays as it is.
+const FULL_SUM: u32 = 0x80000000u;
 
 @group(0) @binding(0) var<uniform> frame: FrameRecord;
 @group(0) @binding(1) var<uniform> task: Task;

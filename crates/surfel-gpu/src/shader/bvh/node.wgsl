@@ -57,11 +57,6 @@ fn lane_bits(lanes: vec4<bool>) -> u32 {
     return bits.x | bits.y | bits.z | bits.w;
 }
 
-// Allowance for rounding, relative to the largest coordinates involved.
-const ROUNDING: f32 = 1e-6;
-// Components of directions nearer to zero than this are replaced by it.
-const MIN_DIRECTION: f32 = 1e-18;
-
 // A ray prepared for the slab test. Along each axis it meets the nearer plane x of a box at the distance
 // (x - `near_origin`) * `inverse`, and the farther one likewise.
 struct SlabRay {

@@ -38,7 +38,7 @@ fn make_light_ray(point: ShadingPointRecord, path: ptr<function, Path>) -> bool 
     let along = max(1.0 - point.light_steepness * cosine, 0.0);
     let ray = Ray(origin, along * point.spawn_t_min, sampled.direction, sampled.t_max);
     // As in `from_surface`.
-    let cos = max(cosine, 0.1);
+    let cos = max(cosine, MIN_OFFSET_COS);
     let height = abs(dot(ray.origin - point.position, point.geometric_normal));
     let weight = sampled.contribution / f32(n_samples);
     *path = Path(ray, weight, point.pixel, vec3<f32>(1.0), height / cos, point.media, point.key, point.index, 1u);
@@ -60,7 +60,7 @@ fn sampled_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u32) -
         let direction = basis_to_world(basis_around(point.normal), cosine_hemisphere(uv));
         // A uniform end of the ray makes occlusion fall off linearly with an occluder's distance.
         let end = 1.0 - owen_sobol_2d(sample_idx, hash(key ^ vec2<u32>(SKY_DISTANCE, 0u))).x;
-        let t_max = min(light.ao_distance * end, NO_LIMIT);
+        let t_max = select(light.ao_distance * end, NO_LIMIT, NO_LIMIT <= light.ao_distance);
         return LightRay(direction, t_max, sky_radiance(light, direction) * point.diffuse);
     }
     if light.kind == ENVIRONMENT {
@@ -128,7 +128,7 @@ fn reflected_radiance(point: ShadingPointRecord, direction: vec3<f32>, strength:
         let middle = direction + point.to_viewer;
         let squared = dot(middle, middle);
         let half_vector = select(point.normal, middle / sqrt(max(squared, 1e-30)), 1e-30 < squared);
-        let cos_view = max(dot(point.normal, point.to_viewer), 1e-3);
+        let cos_view = max(dot(point.normal, point.to_viewer), MIN_GGX_COS);
         // Unit strength means an irradiance of pi at normal incidence.
         reflectance +=
             PI * ggx_specular(cos_view, cos, dot(point.normal, half_vector), point.roughness) * point.glossy;

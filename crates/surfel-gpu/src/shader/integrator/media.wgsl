@@ -141,7 +141,7 @@ fn interface_fresnel(shading: Shading, cos: f32, eta: f32) -> f32 {
 // Makes a path whose ray left the surface at `shading` into `media`; all else is that of `path`.
 fn from_surface(path: Path, shading: Shading, ray: Ray, media: vec4<u32>) -> Path {
     // A ray along the surface would otherwise get an unbounded offset.
-    let cos = max(abs(dot(ray.direction, shading.geometric_normal)), 0.1);
+    let cos = max(abs(dot(ray.direction, shading.geometric_normal)), MIN_OFFSET_COS);
     let height = abs(dot(ray.origin - shading.position, shading.geometric_normal));
     var next = path;
     next.ray = ray;

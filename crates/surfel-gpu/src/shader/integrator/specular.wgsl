@@ -49,7 +49,7 @@ fn refraction(direction: vec3<f32>, normal: vec3<f32>, eta: f32) -> Refraction {
 }
 
 fn ggx_alpha(roughness: f32) -> f32 {
-    return max(roughness * roughness, 1e-4);
+    return max(roughness * roughness, MIN_GGX_ALPHA);
 }
 
 // Samples the distribution of GGX normals visible from `view` (spherical caps, Dupuy and Benyoub 2023), in the frame
@@ -68,7 +68,7 @@ fn sample_ggx_vndf(view: vec3<f32>, roughness: f32, uv: vec2<f32>) -> vec3<f32> 
 
 // Returns Smith's masking function G1 of GGX for a direction whose angle to the normal has cosine `cos`.
 fn smith_g1(cosine: f32, alpha: f32) -> f32 {
-    let cos = max(abs(cosine), 1e-4);
+    let cos = max(abs(cosine), MIN_MASKING_COS);
     let tan_squared = (1.0 - cos * cos) / (cos * cos);
     return 2.0 / (1.0 + sqrt(1.0 + alpha * alpha * tan_squared));
 }

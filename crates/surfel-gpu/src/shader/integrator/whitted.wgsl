@@ -149,7 +149,6 @@ fn shade_miss(path: Path) {
         // Other backgrounds are composited with the finished picture.
         if frame.background == BACKGROUND_ENVIRONMENT {
             add_radiance(path.pixel, weight * background_radiance(path.ray.direction, false));
-            add_alpha(path.pixel, largest(path.weight));
         }
         return;
     }
@@ -186,7 +185,7 @@ fn add_reflection(branch: Path, shading: Shading, media: vec4<u32>) {
     }
     var next = from_surface(branch, shading, spawn(shading, direction), media);
     if facet.cos_view != 0.0 {
-        let cos_light = max(dot(shading.normal, direction), 1e-3);
+        let cos_light = max(dot(shading.normal, direction), MIN_GGX_COS);
         next.weight *= smith_g2_over_g1(facet.cos_view, cos_light, shading.roughness)
             / directional_albedo(facet.cos_view, shading.roughness);
     }
@@ -261,7 +260,7 @@ fn sample_microfacet(path: Path, shading: Shading) -> Microfacet {
     }
     let basis = basis_around(shading.normal);
     let to_viewer = -path.ray.direction;
-    let cos_view = max(dot(to_viewer, basis.normal), 1e-3);
+    let cos_view = max(dot(to_viewer, basis.normal), MIN_GGX_COS);
     let view = vec3<f32>(dot(to_viewer, basis.tangent), dot(to_viewer, basis.bitangent), cos_view);
     let uv = owen_sobol_2d(path.index, hash(path.key ^ vec2<u32>(LOBE_DIRECTION, 0u)));
     let local = sample_ggx_vndf(normalize(view), shading.roughness, uv);

@@ -18,8 +18,9 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
     colors[pixel] = vec4<f32>(color, mean.w);
 }
 
-// Returns the sum of a channel. Each half of the fixed point is rounded once, and their sum once more.
+// Returns the sum of a channel. Each half of the fixed point is rounded once, and their sum once more. A full sum is
+// the same whatever was added last.
 fn channel(pixel: u32, i: u32) -> f32 {
     let lower = f32(atomicLoad(&pixels[pixel][i])) * 2.3283064365386963e-10;
-    return f32(atomicLoad(&pixels[pixel][4u + i])) + lower;
+    return f32(min(atomicLoad(&pixels[pixel][4u + i]), FULL_SUM)) + lower;
 }

@@ -26,9 +26,9 @@ fn intersect_capsule(point: Point, ray: Ray) -> f32 {
     let constant = dot(from_center, from_center) - height * height - thickness * thickness;
     let discriminant = half_linear * half_linear - across * constant;
     // A ray along the axis meets the cap that faces it.
-    let is_parallel = across < 1e-6;
-    let side = (-half_linear - sqrt(max(discriminant, 0.0))) / max(across, 1e-6);
-    let at = select(height + side * slope, select(3e38, -3e38, 0.0 < slope), is_parallel);
+    let is_parallel = across < MIN_ACROSS;
+    let side = (-half_linear - sqrt(max(discriminant, 0.0))) / max(across, MIN_ACROSS);
+    let at = select(height + side * slope, select(NO_LIMIT, -NO_LIMIT, 0.0 < slope), is_parallel);
     let cap_center = from_center - clamp(at, -half_length, half_length) * axis;
     let half_linear_cap = dot(cap_center, ray.direction);
     let of_cap =

@@ -57,7 +57,7 @@ fn add_neighbor(stats: ptr<function, NeighborhoodStats>, offset: vec3<f32>, norm
     }
     let x = dot(offset, (*stats).tangent);
     let y = dot(offset, (*stats).bitangent);
-    if x * x + y * y <= 1e-6 * hit.radius * hit.radius {
+    if x * x + y * y <= MIN_SQUARED_OFFSET * hit.radius * hit.radius {
         return;
     }
     // The lower half of the directions is rotated a little, so that points of a grid are never exactly opposite to each

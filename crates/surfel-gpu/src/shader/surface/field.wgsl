@@ -14,13 +14,6 @@ struct RayPoint {
     inverse_support_squared: f32,
 }
 
-// Returns the weight of a point at a squared distance, which falls from 1 to 0 at the support's radius.
-fn field_weight(squared: f32, inverse_support_squared: f32) -> f32 {
-    let inside = max(1.0 - squared * inverse_support_squared, 0.0);
-    let fourth = inside * inside;
-    return fourth * fourth;
-}
-
 fn inverse_support_squared(radius: f32) -> f32 {
     let support = FIELD_SUPPORT * radius;
     return 1.0 / (support * support);

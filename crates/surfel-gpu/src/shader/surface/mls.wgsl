@@ -36,13 +36,6 @@ const N_COEFFICIENTS: u32 = (DEGREE + 1u) * (DEGREE + 2u) / 2u;
 // A slope less than this fraction of a height has no intersection that counts.
 const MIN_SLOPE: f32 = 1e-6;
 
-// Returns the weight of a point, which falls from 1 to 0 at the support's radius.
-fn mls_weight(offset: vec3<f32>, inverse_support: f32) -> f32 {
-    let inside = max(1.0 - dot(offset, offset) * inverse_support, 0.0);
-    let squared = inside * inside;
-    return squared * squared;
-}
-
 fn no_plane_points() -> PlaneSums {
     return PlaneSums(0.0, vec3<f32>(0.0), Covariance(vec3<f32>(0.0), vec3<f32>(0.0)));
 }

@@ -8,7 +8,7 @@ struct FitPoint {
     // Unit normal.
     normal: vec3<f32>,
     // Reciprocal of the square of the support's radius.
-    inverse_support: f32,
+    inverse_support_squared: f32,
 }
 
 // Weighted sums over the points around a position.
@@ -57,9 +57,7 @@ fn fit_point(point: Point) -> FitPoint {
 
 // Returns the weight of a point, which falls from 1 at the position to 0 at the support's radius.
 fn point_weight(point: FitPoint) -> f32 {
-    let inside = max(1.0 - dot(point.offset, point.offset) * point.inverse_support, 0.0);
-    let squared = inside * inside;
-    return squared * squared;
+    return support_weight(dot(point.offset, point.offset), point.inverse_support_squared);
 }
 
 fn is_within_reach(point: FitPoint, per_radius: f32) -> bool {
@@ -163,7 +161,7 @@ fn intersect_fit(sums: SphereSums, direction: vec3<f32>) -> SphereHit {
     let step = -(value + value) / denominator;
     let normal = gradient + direction * (twice * step);
     let length = sqrt(dot(normal, normal));
-    return SphereHit(1e-3 < length, step / sums.per_radius, normal / max(length, 1e-3));
+    return SphereHit(MIN_GRADIENT < length, step / sums.per_radius, normal / max(length, MIN_GRADIENT));
 }
 
 fn no_overhang(normal: vec3<f32>, center: vec3<f32>, radius: f32) -> OverhangSums {

@@ -44,7 +44,7 @@ fn is_opposed(sums: SplatSums, disc: Surfel) -> bool {
 
 // Adds a disc, which the ray hits at `distance` and at `offset` from its centre.
 fn with_disc(sums: SplatSums, disc: Surfel, distance: f32, offset: vec3<f32>) -> SplatSums {
-    let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
+    let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, MIN_DISC_WEIGHT);
     let surface = visits[visit_idx].surface;
     let turns = (surface == SPLAT || surface == CYLINDER) && is_opposed(sums, disc);
     return SplatSums(

@@ -52,7 +52,7 @@ fn listed_point(points: BlockPoints, lane: u32, shift: vec3<f32>) -> ListedPoint
     let offset = listed - shift;
     let inverse = ball_radius / (MLS_SUPPORT * max(point.radius, 1e-18));
     let is_used = 0.0 < point.radius && dot(listed, listed) < max_squared;
-    return ListedPoint(is_used, offset, mls_weight(offset, inverse * inverse));
+    return ListedPoint(is_used, offset, support_weight(dot(offset, offset), inverse * inverse));
 }
 
 // Fits a plane or a polynomial at a distance along the ray behind the listed position.

@@ -189,7 +189,7 @@ fn hit_at(ray: Ray, part: RaySegment, distance: f32, slope: f32) -> FieldHit {
             let slot = 8u * entry.block_idx + lane;
             let point = slot_point(slot, position);
             let squared = dot(point.center, point.center);
-            let weight = field_weight(squared, inverse_support_squared(point.radius));
+            let weight = support_weight(squared, inverse_support_squared(point.radius));
             hit.normal += weight * side_normal(point.normal, is_flipped);
             if squared < nearest_squared || squared == nearest_squared && slot < hit.slot {
                 nearest_squared = squared;

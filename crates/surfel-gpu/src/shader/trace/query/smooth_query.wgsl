@@ -78,7 +78,7 @@ fn add_color(color: ptr<function, HitColor>, point: FitPoint, slot: u32) {
         (*color).sums = with_color((*color).sums, point, slot_color(slot));
     }
     // A wide disc's neighbours reach less far than it does.
-    let squared = dot(point.offset, point.offset) * point.inverse_support;
+    let squared = dot(point.offset, point.offset) * point.inverse_support_squared;
     let other = (*color).nearest_squared;
     if squared < other || squared == other && slot < (*color).nearest_slot {
         (*color).nearest_squared = squared;
