@@ -35,13 +35,13 @@ impl PartialEq for Colormap {
 use Source::{Formula, Steps};
 
 const MAPS: [(&str, Source); 39] = [
-    ("viridis", Source::Gradient(colorous::VIRIDIS)),
+    (Colormap::VIRIDIS.name, Colormap::VIRIDIS.source),
     ("plasma", Source::Gradient(colorous::PLASMA)),
     ("inferno", Source::Gradient(colorous::INFERNO)),
     ("magma", Source::Gradient(colorous::MAGMA)),
     ("cividis", Source::Gradient(colorous::CIVIDIS)),
     ("turbo", Source::Gradient(colorous::TURBO)),
-    ("gray", Formula(|t| [t; 3])),
+    (Colormap::GRAY.name, Colormap::GRAY.source),
     ("terrain", Formula(terrain)),
     ("coolwarm", Formula(coolwarm)),
     ("jet", Formula(jet)),
@@ -77,6 +77,15 @@ const MAPS: [(&str, Source); 39] = [
 ];
 
 impl Colormap {
+    /// The map of values other than intensity.
+    pub const VIRIDIS: Self = Self::new("viridis", Source::Gradient(colorous::VIRIDIS));
+    /// The map of intensity.
+    pub const GRAY: Self = Self::new("gray", Formula(|t| [t; 3]));
+
+    const fn new(name: &'static str, source: Source) -> Self {
+        Self { name, source, reversed: false }
+    }
+
     /// Finds a map by its name in any case. The suffix `_r` reverses the map.
     ///
     /// # Errors

@@ -77,14 +77,20 @@ impl Image {
 
     /// Returns the columns from the first to before the second.
     pub fn with_columns(self, columns: (u32, u32)) -> Self {
-        if columns == (0, self.width) {
+        let rows = (0, self.height);
+        self.cropped(rows, columns)
+    }
+
+    /// Returns the rows and the columns from the first to before the second.
+    pub fn cropped(self, rows: (u32, u32), columns: (u32, u32)) -> Self {
+        if (rows, columns) == ((0, self.height), (0, self.width)) {
             return self;
         }
-        let Self { width, height, color, coverage, aovs } = self;
-        let cut = Cut { width: width as usize, columns };
+        let Self { width, color, coverage, aovs, .. } = self;
+        let cut = Cut { width: width as usize, rows, columns };
         Self {
             width: columns.1 - columns.0,
-            height,
+            height: rows.1 - rows.0,
             color: cut.column(&color),
             coverage: cut.column(&coverage),
             aovs: aovs.map(|aovs| Aovs {
@@ -113,16 +119,18 @@ impl Image {
     }
 }
 
-/// Columns of pictures of one width, from the first to before the second.
+/// Rows and columns of pictures of one width, from the first to before the second.
 struct Cut {
     width: usize,
+    rows: (u32, u32),
     columns: (u32, u32),
 }
 
 impl Cut {
     fn column<T: Copy>(&self, pixels: &[T]) -> Vec<T> {
         let columns = self.columns.0 as usize..self.columns.1 as usize;
-        pixels.chunks(self.width).flat_map(|row| &row[columns.clone()]).copied().collect()
+        let rows = self.rows.0 as usize * self.width..self.rows.1 as usize * self.width;
+        pixels[rows].chunks(self.width).flat_map(|row| &row[columns.clone()]).copied().collect()
     }
 }
 

@@ -1,5 +1,8 @@
 //! The CPU renderer: it renders tiles on all threads, each tile in a few batches of rays.
 
+use super::adaptive::{
+    MIN_ADAPTIVE_SAMPLES, block, is_adaptive, parts, squared_error, with_whole_blocks,
+};
 use super::raster;
 use super::region::RenderRegion;
 use super::renderer::{RenderStats, Renderer};
@@ -10,9 +13,10 @@ use crate::image::{Band, Image};
 use crate::integrator::{CameraRayBatch, Integrator, PixelSamples, RayCounts, Whitted, albedo};
 use crate::math::{Ray, Vec3, Vec4, hash, morton_decode, owen_sobol_2d};
 use crate::progress::Progress;
-use crate::scene::{Lens, View};
+use crate::scene::{Background, Lens, View};
 use crate::trace::{InstanceFilter, PixelSize, SceneHit, Simd, Support, Tracer};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::time::Instant;
 
 /// A renderer that runs on the current rayon pool.
@@ -63,6 +67,13 @@ fn pixel_size(view: &View) -> PixelSize {
 
 fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
     let Job { tracer: Tracer { progress, .. }, settings, region, .. } = *job;
+    if is_adaptive(settings, region) && with_whole_blocks(region, settings) != region {
+        let blocks = with_whole_blocks(region, settings);
+        let (image, stats) = render_tiles(&Job { region: blocks, ..*job })?;
+        let [rows, columns] = [(region.rows, blocks.rows), (region.columns, blocks.columns)]
+            .map(|((first, end), (zero, _))| (first - zero, end - zero));
+        return Ok((image.cropped(rows, columns), stats));
+    }
     progress.begin("render", region.n_pixels());
     let mut image = region.blank_image(settings);
     let bands: Vec<_> = image.bands_mut(TILE_SIZE as usize).into_iter().enumerate().collect();
@@ -86,6 +97,7 @@ fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
 }
 
 /// Inputs that all tiles share.
+#[derive(Clone, Copy)]
 struct Job<'a> {
     tracer: &'a Tracer<'a>,
     view: &'a View,
@@ -106,6 +118,14 @@ impl Job<'_> {
 fn background(job: &Job, y: u32) -> Vec4 {
     let height = (y as f32 + 0.5) / job.settings.height as f32;
     Vec4::from_array(job.tracer.scene.background.color_at(height))
+}
+
+/// Returns what is added to a row of pixels where no surface covers them: rays have found the colour of an environment.
+fn added_background(job: &Job, y: u32) -> Vec4 {
+    match job.tracer.scene.background {
+        Background::Environment => Vec4::W,
+        _ => background(job, y),
+    }
 }
 
 /// The pixels of a tile: coordinates of its upper left pixel in the picture, and its size.
@@ -143,6 +163,10 @@ impl TileRect {
 /// A rendered tile; its pixels are in the order of `TileRect::pixels`.
 struct Tile {
     rect: TileRect,
+    /// Coordinates in the picture.
+    pixels: Vec<(u32, u32)>,
+    /// Number of samples of each pixel so far.
+    n_samples: Vec<u32>,
     color: Vec<Vec4>,
     coverage: Vec<f32>,
     aovs: Vec<PixelAovs>,
@@ -165,23 +189,31 @@ impl Tile {
         let n = rect.n_pixels();
         let mut tile = Self {
             rect,
+            pixels: rect.pixels().collect(),
+            n_samples: vec![0; n],
             color: vec![Vec4::ZERO; n],
             coverage: vec![0.0; n],
             aovs: Vec::new(),
             counts: RayCounts::default(),
             trace_secs: 0.0,
         };
-        let n_samples = job.region.n_samples();
-        let (first, end) = job.region.samples;
-        let samples_per_batch = (BATCH_SIZE / n as u32).clamp(1, n_samples);
-        for first in (first..end).step_by(samples_per_batch as usize) {
-            tile.add_samples(job, first..end.min(first + samples_per_batch))?;
+        let mut open: Vec<usize> = (0..n).collect();
+        if is_adaptive(settings, job.region) {
+            let n_samples = job.region.n_samples();
+            tile.add_samples(job, &open, 0..MIN_ADAPTIVE_SAMPLES / 2)?;
+            for part in parts(n_samples) {
+                let half: Vec<Vec4> = open.iter().map(|i| tile.mean(job, *i)).collect();
+                tile.add_samples(job, &open, part.clone())?;
+                if part.end < n_samples {
+                    open = tile.pixels_of_noisy_blocks(job, &open, &half);
+                }
+            }
+        } else {
+            tile.add_samples(job, &open, job.region.samples.0..job.region.samples.1)?;
         }
-        for (i, (_, y)) in rect.pixels().enumerate() {
-            let n_samples = n_samples as f32;
-            tile.coverage[i] /= n_samples;
-            tile.color[i] =
-                tile.color[i] / n_samples + (1.0 - tile.coverage[i]) * background(job, y);
+        for i in 0..n {
+            tile.color[i] = tile.mean(job, i);
+            tile.coverage[i] /= tile.n_samples[i] as f32;
         }
         if settings.with_aovs && 1 < settings.samples_per_pixel {
             tile.trace_aovs(job)?;
@@ -189,18 +221,53 @@ impl Tile {
         Ok(tile)
     }
 
-    /// Traces the camera rays with these sample indices of all pixels and adds up their radiance.
-    fn add_samples(&mut self, job: &Job, sample_indices: std::ops::Range<u32>) -> Result<()> {
+    /// Returns the mean of a pixel's samples before the background.
+    fn mean(&self, job: &Job, i: usize) -> Vec4 {
+        let n_samples = self.n_samples[i] as f32;
+        let coverage = self.coverage[i] / n_samples;
+        self.color[i] / n_samples + (1.0 - coverage) * added_background(job, self.pixels[i].1)
+    }
+
+    /// Returns those of the `open` pixels in whose block the error is above the threshold. `half` are
+    /// their means when they had half as many samples.
+    fn pixels_of_noisy_blocks(&self, job: &Job, open: &[usize], half: &[Vec4]) -> Vec<usize> {
+        let max_error = job.settings.noise_threshold.powi(2);
+        let block_of = |i: usize| block(self.pixels[i].0, self.pixels[i].1);
+        let pairs: Vec<(usize, Vec4)> = open.iter().copied().zip(half.iter().copied()).collect();
+        // In Morton order the pixels of a block follow each other.
+        let blocks = pairs.chunk_by(|(a, _), (b, _)| block_of(*a) == block_of(*b));
+        let is_noisy = |pixels: &&[(usize, Vec4)]| {
+            let errors = pixels.iter().map(|(i, half)| squared_error(self.mean(job, *i), *half));
+            let error = errors.sum::<f32>() / pixels.len() as f32;
+            max_error < error
+        };
+        blocks.filter(is_noisy).flatten().map(|(i, _)| *i).collect()
+    }
+
+    /// Traces the camera rays with these sample indices of the pixels in `open` and adds up their radiance.
+    fn add_samples(&mut self, job: &Job, open: &[usize], samples: Range<u32>) -> Result<()> {
+        if open.is_empty() {
+            return Ok(());
+        }
+        let per_batch = (BATCH_SIZE / open.len() as u32).clamp(1, job.region.n_samples());
+        for first in samples.clone().step_by(per_batch as usize) {
+            self.add_batch(job, open, first..samples.end.min(first + per_batch))?;
+        }
+        open.iter().for_each(|i| self.n_samples[*i] += samples.len() as u32);
+        Ok(())
+    }
+
+    fn add_batch(&mut self, job: &Job, open: &[usize], samples: Range<u32>) -> Result<()> {
         let Job { tracer, settings, .. } = *job;
-        let per_pixel = sample_indices.len();
-        let n = self.color.len() * per_pixel;
+        let per_pixel = samples.len();
+        let n = open.len() * per_pixel;
         let mut rays = Vec::with_capacity(n);
         let (mut keys, mut indices) = (Vec::with_capacity(n), Vec::with_capacity(n));
         let mut backgrounds = Vec::with_capacity(n);
-        for (x, y) in self.rect.pixels() {
+        for (x, y) in open.iter().map(|i| self.pixels[*i]) {
             let key = hash(settings.seed ^ hash(u64::from(y) << 32 | u64::from(x)));
             let background = background(job, y);
-            for index in sample_indices.clone() {
+            for index in samples.clone() {
                 let (dx, dy) = if settings.samples_per_pixel == 1 {
                     (0.5, 0.5)
                 } else {
@@ -232,9 +299,10 @@ impl Tile {
         let batch = CameraRayBatch { tracer, rays: &rays, hits: &hits, samples };
         let integrator = Whitted { max_depth: settings.max_depth };
         let (colors, counts) = integrator.radiance(&batch)?;
-        for (i, color) in colors.iter().enumerate() {
-            self.color[i / per_pixel] += *color;
-            self.coverage[i / per_pixel] += color.w;
+        for (sample, color) in colors.iter().enumerate() {
+            let i = open[sample / per_pixel];
+            self.color[i] += *color;
+            self.coverage[i] += color.w;
         }
         self.counts += counts;
         Ok(())
@@ -242,13 +310,12 @@ impl Tile {
 
     /// Traces the rays through the pixels' centres for the AOVs.
     fn trace_aovs(&mut self, job: &Job) -> Result<()> {
-        let rays: Vec<Ray> = self
-            .rect
-            .pixels()
-            .map(|(x, y)| job.camera_ray(x as f32 + 0.5, y as f32 + 0.5))
-            .collect();
+        let center = |(x, y): &(u32, u32)| job.camera_ray(*x as f32 + 0.5, *y as f32 + 0.5);
+        let rays: Vec<Ray> = self.pixels.iter().map(center).collect();
         let mut hits = vec![SceneHit::MISS; rays.len()];
+        let start = Instant::now();
         job.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+        self.trace_secs += start.elapsed().as_secs_f64();
         self.counts.primary += rays.len() as u64;
         self.set_aovs(job, &rays, &hits)
     }
@@ -271,7 +338,7 @@ impl Tile {
 
     /// Copies the tile to its row of tiles, which has these columns of the picture.
     fn copy_to(&self, band: &mut Band, (first, end): (u32, u32)) {
-        for (i, (x, y)) in self.rect.pixels().enumerate() {
+        for (i, (x, y)) in self.pixels.iter().copied().enumerate() {
             let pixel = ((y - self.rect.y) * (end - first) + x - first) as usize;
             band.color[pixel] = self.color[i].to_array();
             band.coverage[pixel] = self.coverage[i];

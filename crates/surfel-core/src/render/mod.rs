@@ -1,5 +1,6 @@
 //! Renderers: from a flat scene to a picture.
 
+mod adaptive;
 mod cpu;
 mod footprint;
 mod point_light;
@@ -8,6 +9,7 @@ mod region;
 mod renderer;
 mod settings;
 
+pub use adaptive::MIN_ADAPTIVE_SAMPLES;
 pub use cpu::CpuRenderer;
 pub use footprint::POINT_SIZE_RANGE;
 pub use raster::uses_rasterizer;

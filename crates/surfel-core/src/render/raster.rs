@@ -243,7 +243,11 @@ impl<'s> Raster<'s> {
         let cloud = cloud(scene, instance);
         let points = &cloud.points;
         let material = &scene.materials[instance.material_idx as usize];
-        let albedo = material.base_color * points.surfel(slot).color;
+        let albedo = material.color_over(points.surfel(slot).color);
+        let emission = match material.is_unlit {
+            true => Vec3::ZERO,
+            false => material.emissive + material.emissive_strength * albedo,
+        };
         let lit = cloud.has_normals.then(|| {
             let normal = instance.world_normal(points.normal(slot));
             let to_viewer = -view.ray(x as f32 + 0.5, y as f32 + 0.5).direction;
@@ -256,7 +260,7 @@ impl<'s> Raster<'s> {
             }
             _ => Vec3::splat(self.eye_dome((x, y), index)),
         };
-        band.color[pixel] = (light * albedo).extend(1.0).to_array();
+        band.color[pixel] = (light * albedo + emission).extend(1.0).to_array();
         band.coverage[pixel] = 1.0;
         let Some(aovs) = &mut band.aovs else { return };
         aovs.depth[pixel] = self.depths[index];

@@ -18,6 +18,9 @@ settings! {
         resolution: (u32, u32) = default_resolution(), Resolution, "WxH", common;
         /// Camera rays per pixel.
         spp: u32 = Settings::default().samples_per_pixel, count(1, MAX_SAMPLES as u64), "N", common;
+        /// Error at which pixels take no more than some of the --spp camera rays, on the CPU: 0.01 is about one of 255
+        /// steps of brightness. 0 traces all rays everywhere.
+        noise_threshold: f64 = 0.0, number(0.0, 1.0), "ERROR";
         /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
         light_samples: u32 = Settings::default().light_samples, count(1, MAX_SAMPLES as u64), "N";
         /// Maximum number of reflections and refractions of a ray.

@@ -3,6 +3,7 @@
 use super::LoadedScene;
 use crate::description::{PreparationSettings, SceneDescription, misspelled};
 use surfel_core::progress::Progress;
+use surfel_core::render::MIN_ADAPTIVE_SAMPLES;
 use surfel_core::scene::Background;
 use surfel_formats::{BitDepth, FileInfo, TextColumn};
 
@@ -10,6 +11,15 @@ impl LoadedScene {
     /// Warns of settings that have no effect.
     pub(super) fn report_unused(&self, description: &SceneDescription, progress: &dyn Progress) {
         report_unused_of_output(description, progress);
+        let picture = &description.picture;
+        if 0.0 < picture.noise_threshold() && picture.spp() <= MIN_ADAPTIVE_SAMPLES {
+            let line = format!(
+                "warning: no effect: noise is estimated after {MIN_ADAPTIVE_SAMPLES} camera rays per pixel, of which there are \
+                 {} at most",
+                picture.spp()
+            );
+            progress.choice(&line, &["noise_threshold", "spp"]);
+        }
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
         self.report_unused_of_points(description, progress);
