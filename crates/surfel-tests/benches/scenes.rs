@@ -264,6 +264,7 @@ fn cancelling(criterion: &mut Criterion) {
         width: 1280,
         height: 720,
         samples_per_pixel: 16,
+        noise_threshold: 0.0,
         light_samples: 64,
         max_depth: 3,
         seed: 0,

@@ -14,7 +14,7 @@ use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
 use crate::scene::color::SupportColors;
-use crate::surface::{EdgeTest, SurfaceKind, SurfaceOptions, edge_retest_factor};
+use crate::surface::{EdgeTest, MIN_SLIT_DEPTH, SurfaceKind, SurfaceOptions, edge_retest_factor};
 
 /// A point cloud with the surface that its points describe.
 #[derive(Clone, Debug, Default)]
@@ -49,8 +49,8 @@ pub struct FlatCloud {
     pub blends_colors: bool,
     /// Colours of hits by their support, instead of the points' own.
     pub support_colors: Option<SupportColors>,
-    /// Maximum distance between a ray's nearest disc and the discs that decide about its hit: the largest radius,
-    /// or 0 if the disc itself is the surface.
+    /// Maximum distance between a ray's nearest disc and what decides about its hit: discs that are blended with it, and
+    /// what is behind a slit; 0 if the disc itself is the surface.
     pub max_blend_distance: f32,
 }
 
@@ -232,9 +232,14 @@ impl FlatCloud {
     }
 
     fn set_max_blend_distance(&mut self) {
-        let is_smooth = matches!(self.surface, SurfaceKind::Smooth | SurfaceKind::Mls);
-        let looks_behind = self.surface.blends_discs() || is_smooth;
-        self.max_blend_distance = if looks_behind { self.points.max_radius() } else { 0.0 };
+        let max_radius = self.points.max_radius();
+        self.max_blend_distance = match self.surface {
+            SurfaceKind::Smooth if self.has_front_sides => f32::INFINITY,
+            SurfaceKind::Smooth => (1.0 + MIN_SLIT_DEPTH) * max_radius,
+            SurfaceKind::Mls => max_radius,
+            surface if surface.blends_discs() => max_radius,
+            _ => 0.0,
+        };
     }
 }
 

@@ -3,7 +3,7 @@
 use super::block_tree::{BlockTree, Slot};
 use super::refit::Refit;
 use crate::bvh::{self, BvhNode, BvhPrimitive, NO_PRIMITIVE};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Aabb, Floats, LANES, Lanes, PortableLanes, Vec3, Vec3Lanes};
 use crate::progress::Progress;
 use crate::surface::triangle;
@@ -108,7 +108,11 @@ impl FlatTriangles {
                 if is_traceable(corners) { triangle::bounds(corners) } else { Aabb::EMPTY };
             BvhPrimitive::new(bounds, id, 0.0)
         };
-        let ids = 0..triangles.len() as u32;
+        let n_triangles = u32::try_from(triangles.len()).map_err(|_| Error::TooManyBlocks {
+            found: triangles.len() / LANES,
+            limit: u32::MAX as usize / LANES,
+        })?;
+        let ids = 0..n_triangles;
         let tree = bvh::build(ids.into_par_iter().map(primitive).collect(), |_| true, progress)?;
         let encode = |ids: &[u32; LANES]| TriangleBlock::new(ids, corners);
         let blocks = tree.blocks.par_iter().map(encode).collect();

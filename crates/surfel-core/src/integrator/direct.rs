@@ -3,7 +3,7 @@
 use super::batch::RayCounts;
 use super::media::{MediumRay, MediumStack};
 use super::shading::Shading;
-use super::specular::ggx_specular;
+use super::specular::{MIN_GGX_COS, ggx_specular};
 use super::transmittance::shadow_transmittance;
 use crate::error::Result;
 use crate::flat::FlatPunctualLight;
@@ -218,7 +218,7 @@ impl DirectLight<'_> {
                 let n_samples = point.n_light_samples.min(max_samples);
                 let weight = 1.0 / n_samples as f32;
                 for sample_idx in 0..n_samples {
-                    let index = point.index * n_samples + sample_idx;
+                    let index = point.index.wrapping_mul(n_samples).wrapping_add(sample_idx);
                     let Some(sampled) = sample(point, index) else { continue };
                     // A shading normal can let light in from behind the geometric surface.
                     let is_behind = point.shading.geometric_normal.dot(sampled.direction) <= 0.0;
@@ -261,7 +261,7 @@ impl ShadingPoint {
         let mut reflectance = self.diffuse;
         if self.glossy != Vec3::ZERO {
             let half = (direction + self.to_viewer).normalize_or(normal);
-            let cos_view = normal.dot(self.to_viewer).max(1e-3);
+            let cos_view = normal.dot(self.to_viewer).max(MIN_GGX_COS);
             let roughness = self.shading.roughness;
             // Unit strength means an irradiance of pi at normal incidence.
             reflectance +=

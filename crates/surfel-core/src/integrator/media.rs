@@ -16,6 +16,9 @@ pub struct MediumStack([u32; MAX_NESTED]);
 const MAX_NESTED: usize = 4;
 /// Marks an empty slot of a medium stack.
 const NONE: u32 = u32::MAX;
+/// Minimum cosine to the normal by which the height of a ray's origin above its surface gives the offset along the ray.
+/// A ray along the surface would otherwise get an unbounded offset.
+pub const MIN_OFFSET_COS: f32 = 0.1;
 
 impl MediumStack {
     /// The stack of a ray that is inside of no instance.
@@ -88,11 +91,9 @@ impl MediumRay {
     /// Makes a ray that left the surface at `shading` into `media`.
     #[inline]
     pub fn from_surface(shading: &Shading, ray: Ray, media: MediumStack) -> Self {
-        /// A ray along the surface would otherwise get an unbounded offset.
-        const MIN_COS: f32 = 0.1;
         let height = (ray.origin - shading.position).dot(shading.geometric_normal).abs();
         let cos = ray.direction.dot(shading.geometric_normal).abs();
-        Self { ray, media, origin_offset: height / cos.max(MIN_COS) }
+        Self { ray, media, origin_offset: height / cos.max(MIN_OFFSET_COS) }
     }
 
     /// Returns the media on both sides of `hit`, whose material is in `shading`.

@@ -56,12 +56,11 @@ impl Shading {
         let instance = &scene.instances[hit.instance as usize];
         let material = &scene.materials[instance.material_idx as usize];
         let position = ray.at(hit.distance);
-        let color = if material.ignores_vertex_colors { Vec3::ONE } else { hit.color };
         let mut shading = Self {
             position,
             normal: hit.normal,
             geometric_normal: hit.geometric_normal,
-            base_color: material.base_color * color,
+            base_color: material.color_over(hit.color),
             alpha: material.alpha * hit.alpha,
             metallic: material.metallic,
             roughness: material.roughness,

@@ -8,6 +8,12 @@ use std::sync::OnceLock;
 pub const ALBEDO_STEPS: usize = 32;
 /// Roughness below which a surface is a perfect mirror.
 pub const MIN_ROUGHNESS: f32 = 0.02;
+/// Minimum GGX width parameter alpha.
+pub const MIN_GGX_ALPHA: f32 = 1e-4;
+/// Minimum cosine to the normal of a view or a light on a rough surface.
+pub const MIN_GGX_COS: f32 = 1e-3;
+/// Minimum cosine to the normal in the masking function.
+pub const MIN_MASKING_COS: f32 = 1e-4;
 
 /// Returns the fraction of unpolarised light that a dielectric interface reflects (Fresnel 1823, exact).
 ///
@@ -61,7 +67,7 @@ pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
 
 /// Returns the GGX width parameter alpha of a perceptual roughness (Burley 2012).
 fn ggx_alpha(roughness: f32) -> f32 {
-    (roughness * roughness).max(1e-4)
+    (roughness * roughness).max(MIN_GGX_ALPHA)
 }
 
 /// Samples the distribution of GGX normals visible from `view` (spherical caps, Dupuy and Benyoub 2023).
@@ -80,7 +86,7 @@ pub fn sample_ggx_vndf(view: Vec3, roughness: f32, (u, v): (f32, f32)) -> Vec3 {
 
 /// Returns Smith's masking function G1 of GGX for a direction whose angle to the normal has cosine `cos`.
 fn smith_g1(cos: f32, alpha: f32) -> f32 {
-    let cos = cos.abs().max(1e-4);
+    let cos = cos.abs().max(MIN_MASKING_COS);
     let tan_squared = (1.0 - cos * cos) / (cos * cos);
     2.0 / (1.0 + (1.0 + alpha * alpha * tan_squared).sqrt())
 }
@@ -102,7 +108,10 @@ pub fn directional_albedo(cos: f32, roughness: f32) -> f32 {
     let table = TABLE.get_or_init(|| {
         let value = |i: usize| {
             let cos = (i % ALBEDO_STEPS) as f32 / (ALBEDO_STEPS - 1) as f32;
-            integrate_albedo(cos.max(1e-3), (i / ALBEDO_STEPS) as f32 / (ALBEDO_STEPS - 1) as f32)
+            integrate_albedo(
+                cos.max(MIN_GGX_COS),
+                (i / ALBEDO_STEPS) as f32 / (ALBEDO_STEPS - 1) as f32,
+            )
         };
         (0..ALBEDO_STEPS * ALBEDO_STEPS).map(value).collect()
     });

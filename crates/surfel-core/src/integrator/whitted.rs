@@ -6,8 +6,8 @@ use super::direct::{DirectLight, ShadingPoint};
 use super::media::{Interface, MediumRay};
 use super::shading::Shading;
 use super::specular::{
-    MIN_ROUGHNESS, directional_albedo, fresnel, reflect, refract, sample_ggx_vndf, schlick_fresnel,
-    smith_g2_over_g1, thin_slab_fresnel,
+    MIN_GGX_COS, MIN_ROUGHNESS, directional_albedo, fresnel, reflect, refract, sample_ggx_vndf,
+    schlick_fresnel, smith_g2_over_g1, thin_slab_fresnel,
 };
 use crate::error::Result;
 use crate::math::{Basis, PACKET_WIDTH, Ray, Vec3, Vec4, hash, owen_sobol_2d};
@@ -276,7 +276,10 @@ impl<'a> WavefrontState<'a> {
             depth: path.depth + 1,
             ..*path
         };
-        (0..n_branches).map(move |i| Path { index: path.index * n_branches + i, ..path })
+        (0..n_branches).map(move |i| Path {
+            index: path.index.wrapping_mul(n_branches).wrapping_add(i),
+            ..path
+        })
     }
 
     /// Adds the radiance that a path finds where its ray leaves the scene.
@@ -292,7 +295,6 @@ impl<'a> WavefrontState<'a> {
             {
                 let radiance = background_radiance(self.batch.tracer.scene, direction, false);
                 self.radiance[ray_idx] += weight * radiance;
-                self.alpha[ray_idx] += path.weight.max_element();
             }
             // The renderer composites the background.
             MissBehavior::Background => {}
@@ -335,7 +337,7 @@ impl<'a> WavefrontState<'a> {
             reflected = reflect(reflected, shading.geometric_normal);
         }
         let lobe_weight = cos_view.map_or(1.0, |cos_view| {
-            let cos_light = shading.normal.dot(reflected).max(1e-3);
+            let cos_light = shading.normal.dot(reflected).max(MIN_GGX_COS);
             smith_g2_over_g1(cos_view, cos_light, shading.roughness)
                 / directional_albedo(cos_view, shading.roughness)
         });
@@ -421,7 +423,7 @@ fn sample_microfacet_normal(path: &Path, shading: &Shading) -> (Vec3, Option<f32
     let view = Vec3::new(
         to_viewer.dot(basis.tangent),
         to_viewer.dot(basis.bitangent),
-        to_viewer.dot(basis.normal).max(1e-3),
+        to_viewer.dot(basis.normal).max(MIN_GGX_COS),
     );
     let uv = owen_sobol_2d(path.index, hash(path.key ^ LOBE_DIRECTION));
     let normal = basis.to_world(sample_ggx_vndf(view.normalize(), shading.roughness, uv));

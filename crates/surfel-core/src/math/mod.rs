@@ -38,4 +38,4 @@ pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, owen_sobol_2d, uniform_cone};
 pub use set_bits::{SetBits, set_bits};
-pub use slab::{clip_to_box, clip_to_slab, finite_inverse, finite_inverse_vec3};
+pub use slab::{MIN_DIRECTION, clip_to_box, clip_to_slab, finite_inverse, finite_inverse_vec3};

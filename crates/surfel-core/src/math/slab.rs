@@ -30,7 +30,7 @@ pub fn clip_to_box<F: Floats>(
 }
 
 /// Components of directions nearer to zero than this are replaced by it.
-const MIN_DIRECTION: f32 = 1e-18;
+pub const MIN_DIRECTION: f32 = 1e-18;
 
 /// Returns `1 / direction`, and a large finite number for a direction close to zero: no product of an
 /// infinity and a zero then gives NaN in a slab test.

@@ -13,7 +13,7 @@ use super::scan::scan_grid::ScanGrids;
 use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
 use super::structure::find_structures::{all_scattered, find_structures};
-use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
 use super::structure::typical::Typical;
@@ -72,7 +72,8 @@ pub struct Estimates<'a> {
 }
 
 /// Fits planes and estimates radii as far as they are missing. `normals` are those that denoising has found, zero where
-/// it has not.
+/// it has not. They replace the normals of planes through the nearest neighbours; planes through the neighbours of
+/// [`NeighborMethod::Grid`], [`NeighborMethod::ScanLine`] and [`Neighborhood::Within`] keep their own.
 pub fn estimate<'a>(
     positions: &'a [Vec3],
     normals: Option<&[Vec3]>,
@@ -121,7 +122,9 @@ fn estimate_by_nearest<'a>(
     let tree = KdTree::new(positions, progress)?;
     let visit = |point: usize, neighbors: &[Neighbor]| {
         let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
-        let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
+        // Farther ones are for radii alone.
+        let near = &neighbors[..k_normal.max(MIN_JET_NEIGHBORS).min(neighbors.len())];
+        let jet = fit_nearest_jet(positions, point, near, &fit, k_normal);
         let distance = k_radius.map_or(0.0, |k| kth_distance(neighbors, k));
         let around = has_voters
             .then(|| (voters_among(neighbors), is_by_gap(positions, point, neighbors, fit.normal)));
@@ -181,6 +184,8 @@ pub fn find_shapes<'a>(
     if let (true, StructureChoice::Auto, Some((fits, _))) = (is_land, preparation.structure, &*fits)
     {
         let typical = Typical::of(fits, radii);
+        // By default the planes have 16 neighbours and the radii reach to the 12th, so that this is 0.87 of the noise.
+        // The thickness of walls is chosen for it.
         let noise = typical.noise() * typical.radius;
         find_sparse_walls(&cloud.positions, noise, typical.radius, &mut shapes, progress)?;
         found = StructureReport::of(&shapes);
@@ -194,7 +199,7 @@ pub fn find_shapes<'a>(
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
         for (fit, shape) in fits.iter_mut().zip(&shapes) {
-            if shape.structure == Structure::Surface {
+            if shape.is_disc() {
                 fit.normal = shape.normal;
             }
         }
@@ -231,4 +236,40 @@ fn fit_planes(
     }
     let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
     Ok((map_neighborhoods(positions, method, neighborhood, progress, fit)?, neighborhood))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Normals of points whose structure is not that of their nearest neighbours.
+
+    use crate::math::{Random, Vec3};
+    use crate::points::Structure;
+    use crate::points::test_clouds::prepared;
+    use std::f32::consts::TAU;
+
+    #[test]
+    fn redundant_points_of_scan_lines_have_the_normal_of_the_surface() {
+        // Twenty rings on rough ground, 0.4 apart, of points that are 0.02 apart.
+        let mut random = Random::new(3, 0);
+        let mut points = Vec::new();
+        for ring in 0..20 {
+            let radius = 3.0 + 0.4 * ring as f32;
+            let n = (TAU * radius / 0.02) as usize;
+            for i in 0..n {
+                let (sin, cos) = (TAU * i as f32 / n as f32).sin_cos();
+                let height = 0.004 * (random.next_f32() - 0.5);
+                points.push(Vec3::new(radius * cos, radius * sin, height));
+            }
+        }
+        let (cloud, structures) = prepared(points);
+        let of_redundant = cloud
+            .normals()
+            .iter()
+            .zip(&structures)
+            .filter(|(_, kind)| **kind == Structure::Redundant);
+        let n_redundant = of_redundant.clone().count();
+        let n_level = of_redundant.filter(|(normal, _)| 0.99 < normal.z.abs()).count();
+        assert!(cloud.len() < 4 * n_redundant, "{n_redundant} of {}", cloud.len());
+        assert!(95 * n_redundant < 100 * n_level, "{n_level} of {n_redundant}");
+    }
 }

@@ -1,7 +1,8 @@
 //! Point clouds as columns, and the preparation that tracing needs.
 //!
 //! `prepare` runs the preparation from its first step to its last, with the settings of `preparation`; `estimate` has the
-//! steps that share one search for neighbours. A folder for each subject:
+//! steps that share one search for neighbours, and `morph_offsets` repeats them for morph targets. A folder for each
+//! subject:
 //!
 //! - `cloud`: the columns of points, conditions on them, merging;
 //! - `neighbors`: the points around each point;
@@ -26,6 +27,7 @@ mod denoising;
 mod gaps;
 mod preparation;
 mod estimate;
+mod morph_offsets;
 mod prepared_cloud;
 mod prepare;
 #[cfg(test)]
@@ -47,18 +49,15 @@ pub use cloud::gaussians::{
 pub use cloud::merge::merge;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};
-pub use denoising::denoise::{Denoise, DenoiseReport, denoise};
+pub use denoising::denoise::{Denoise, DenoiseReport, Denoised, denoise};
 pub use denoising::line_axes::LineReport;
 pub use normals::orient::{Orientation, orient};
-pub use normals::planes::{NormalReport, PlaneFit, fill_missing, fit_plane};
+pub use normals::planes::{NormalReport, PlaneFit, fit_plane};
 pub use preparation::{Preparation, SURFACE_VARIATION};
 pub use prepare::{PreparationReport, prepare, select_points};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
-pub use radii::radius::{
-    DEFAULT_RADIUS_SAMPLES, DistanceSample, Radius, RadiusReport, estimate_radii, median_distance,
-    spacing,
-};
+pub use radii::radius::{DEFAULT_RADIUS_SAMPLES, Radius, RadiusReport, spacing};
 pub use scan::grid_rays::locate_stations;
 pub use scan::mixed_pixels::MixedPixels;
 pub use scan::scan_angle::{POINT_SOURCE, SCAN_ANGLE};
@@ -66,5 +65,5 @@ pub use structure::point_shape::{
     PointShape, STRUCTURE, Structure, StructureChoice, StructureReport,
 };
 pub use structure::solids::CAPSULE_ASPECT;
-pub(crate) use up::MAX_CAMERA_SLOPE;
 pub use up::{InferredUp, UpConvention, infer_up};
+pub(crate) use up::{is_camera_frame, is_in_camera_view};

@@ -35,8 +35,8 @@ pub struct Preparation {
     pub normals: Neighborhood,
     /// True to estimate the normals that the file lacks. Spheres and pixels need none.
     pub estimates_normals: bool,
-    /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
-    /// the stations, if these are known.
+    /// The signs of normals. Applies if all normals are estimated. `Auto` and `Station` also turn those of the file, if
+    /// all stations are known.
     pub orientation: Orientation,
     /// True to take the lengths of the file's normals for radii, if these vary as radii do and the file has no others.
     pub radii_from_normals: bool,

@@ -6,6 +6,7 @@ use super::cleaning::subsample::subsample;
 use super::denoising::denoise::{Denoise, DenoiseReport, denoise};
 use super::denoising::line_axes::{LineReport, find_axes, move_to_axes};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
+use super::morph_offsets::add_morph_offsets;
 use super::neighbors::Neighborhood;
 use super::normals::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::normals::planes::{NormalReport, PlaneFit, fill_missing};
@@ -31,7 +32,7 @@ pub struct PreparationReport {
     pub denoise: Option<DenoiseReport>,
     /// Effect of moving points onto the axes of lines, if points were moved.
     pub lines: Option<LineReport>,
-    /// Number of points after cleaning and subsampling.
+    /// Number of points after all steps that drop points.
     pub n_points: usize,
     /// Origin of the estimated normals.
     pub normals: Option<NormalReport>,
@@ -43,7 +44,8 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans a cloud, and drops mixed pixels, points beyond a subsample and outliers, as the preparation says.
+/// Cleans a cloud, and drops mixed pixels, points beyond a subsample and outliers, as the preparation says. A column of
+/// normals or radii of which no usable entry is left is removed.
 ///
 /// # Errors
 ///
@@ -70,6 +72,9 @@ pub fn select_points(
     if let Some(choice) = preparation.remove_outliers {
         cloud = remove_outliers(&cloud, choice, progress)?;
     }
+    let is_missing = |normal: &Vec3| *normal == Vec3::ZERO;
+    cloud.normals = cloud.normals.filter(|normals| !normals.iter().all(is_missing));
+    cloud.radii = cloud.radii.filter(|radii| !radii.iter().all(|radius| *radius == 0.0));
     Ok((cloud, report))
 }
 
@@ -160,7 +165,7 @@ pub fn prepare(
         add_structures(&mut cloud, &shapes);
         report.structure = Some(found);
     }
-    add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
+    add_morph_offsets(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
 }
 
@@ -213,7 +218,7 @@ fn add_normals(
         cloud.normals = Some(orient(cloud, normals, orientation, progress)?);
         return Ok(report);
     };
-    // Each takes its sign from the nearest normal of the file; `clean` leaves at least one.
+    // Each takes its sign from the nearest normal of the file; `select_points` leaves at least one.
     let mut normals = given.clone();
     fill_missing(&cloud.positions, &mut normals, progress)?;
     let mut report = NormalReport::default();
@@ -256,64 +261,12 @@ fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {
     }
 }
 
-/// Adds offsets of the estimated normals and radii to each morph target: the estimates from the positions of the
-/// target minus those at rest. In between both change linearly, as positions do.
-fn add_to_morphs(
-    cloud: &mut PointCloud,
-    estimated: &Missing,
-    preparation: &Preparation,
-    progress: &dyn Progress,
-) -> Result<()> {
-    let PointCloud { positions, normals, radii, morphs, .. } = cloud;
-    if !(estimated.normals || estimated.radii) {
-        return Ok(());
-    }
-    for morph in morphs {
-        let moved: Vec<Vec3> = positions.iter().zip(&morph.positions).map(|(a, b)| a + b).collect();
-        if !moved.iter().all(|position| position.is_finite()) {
-            continue;
-        }
-        let estimates = estimate(&moved, None, preparation, estimated, &WithoutNotes(progress))?;
-        if let (Some((fits, _)), Some(normals)) = (estimates.fits, &*normals) {
-            let added = |(fit, normal): (&PlaneFit, &Vec3)| match fit.normal {
-                // Without a plane at the target, the normal stays; otherwise it keeps its side.
-                Vec3::ZERO => Vec3::ZERO,
-                found if found.dot(*normal) < 0.0 => -found - normal,
-                found => found - normal,
-            };
-            morph.normals = Some(fits.iter().zip(normals).map(added).collect());
-        }
-        if let (Some((moved_radii, _)), Some(radii)) = (estimates.radii, &*radii) {
-            let added = moved_radii.iter().zip(radii).map(|(moved, radius)| moved - radius);
-            morph.radii = Some(added.collect());
-        }
-    }
-    Ok(())
-}
-
-/// Drops the notes about points of morph targets.
-struct WithoutNotes<'a>(&'a dyn Progress);
-
-impl Progress for WithoutNotes<'_> {
-    fn begin(&self, stage: &str, total: u64) {
-        self.0.begin(stage, total);
-    }
-
-    fn advance(&self, units: u64) {
-        self.0.advance(units);
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     //! Prepared columns, reports and errors.
 
     use super::*;
-    use crate::math::Random;
+    use crate::math::{DVec3, Random};
     use crate::points::neighbors::NeighborMethod;
     use crate::points::{STRUCTURE, StructureChoice, Subsample};
     use crate::progress::NoProgress;
@@ -404,14 +357,36 @@ mod tests {
 
     #[test]
     fn normals_do_not_depend_on_the_choice_of_radii() {
-        let radii = [Radius::default(), Radius::Fixed(0.1), Radius::Median { n: 6, samples: 20 }];
+        let radii = [
+            Radius::default(),
+            Radius::Fixed(0.1),
+            Radius::Median { n: 6, samples: 20 },
+            Radius::Adaptive { k: 64 },
+        ];
         let normals = radii.map(|radius| {
             // Edges are sought with structures, which only adaptive radii have.
             let structure = StructureChoice::Surface;
             let preparation = Preparation { radius, structure, ..Preparation::default() };
             prepare(ball(3000), &preparation, &NoProgress).unwrap().0.normals().to_vec()
         });
-        assert!(normals[0] == normals[1] && normals[0] == normals[2]);
+        assert!(normals.iter().all(|other| *other == normals[0]));
+    }
+
+    #[test]
+    fn normals_are_oriented_if_all_points_with_a_normal_are_dropped() {
+        let mut cloud = ball(3000);
+        let mut normals = vec![Vec3::ZERO; 3000];
+        normals[2999] = Vec3::Z;
+        cloud.normals = Some(normals);
+        let preparation = Preparation {
+            subsample: Some(Subsample::First(2999)),
+            orientation: Orientation::Viewpoint(DVec3::ZERO),
+            structure: StructureChoice::Surface,
+            ..Preparation::default()
+        };
+        let cloud = prepare(cloud, &preparation, &NoProgress).unwrap().0;
+        let mut pairs = cloud.normals().iter().zip(cloud.positions());
+        assert!(pairs.all(|(normal, position)| normal.dot(*position) <= 0.0));
     }
 
     #[test]

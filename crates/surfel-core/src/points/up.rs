@@ -51,7 +51,7 @@ const MIN_FLAT_RATIO: f64 = 4.0;
 const MIN_TERRAIN_SIDE: f64 = 50.0;
 
 /// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
-pub(crate) const MAX_CAMERA_SLOPE: f32 = 1.2;
+const MAX_CAMERA_SLOPE: f32 = 1.2;
 
 /// Minimum fraction of the points within the field of view of a depth camera.
 const MIN_FRACTION_IN_VIEW: f64 = 0.99;
@@ -84,6 +84,8 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
     }
     let shape = AxisStatistics::of(&cloud.positions);
     let evidence = shape.flat_base().or_else(|| shape.terrain());
+    let zero = (-cloud.origin).as_vec3();
+    let offsets = || sample(&cloud.positions).iter().map(|p| *p - zero).collect::<Vec<Vec3>>();
     match convention {
         UpConvention::YUp(format) => match evidence {
             Some(found) if found.up == Vec3::Z => found,
@@ -93,10 +95,9 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
             Some(found) if found.up == Vec3::Y => found,
             _ => choice(Vec3::Z, format!("up is +Z, the convention of {format}")),
         },
-        _ if is_camera_frame(&cloud.positions) => {
-            let reason =
-                "up is -Y: all points lie in the field of view of a depth camera at the origin";
-            choice(Vec3::NEG_Y, reason.to_owned())
+        _ if is_camera_frame(&offsets()) => {
+            let view = "the field of view of a depth camera at the origin";
+            choice(Vec3::NEG_Y, format!("up is -Y: nearly all points lie in {view}"))
         }
         _ => evidence
             .or_else(|| shape.figure())
@@ -126,18 +127,24 @@ pub(crate) fn is_mostly_land(positions: &[Vec3]) -> bool {
     }))
 }
 
-/// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
-pub(crate) fn is_camera_frame(positions: &[Vec3]) -> bool {
-    let sample = sample(positions);
-    let in_view = |p: &&Vec3| p.x.abs().max(p.y.abs()) < MAX_CAMERA_SLOPE * p.z;
-    let n_in_view = sample.iter().filter(in_view).count() as f64;
+/// Returns true if nearly all points lie in the field of view of a depth camera and fill it. `offsets` are those of the
+/// points from the camera, whose X points right, Y down and Z ahead.
+pub(crate) fn is_camera_frame(offsets: &[Vec3]) -> bool {
+    let sample = sample(offsets);
+    let seen: Vec<Vec3> = sample.iter().copied().filter(|p| is_in_camera_view(*p)).collect();
     let fills_view = |axis: usize| {
-        let slopes = sample.iter().map(|p| p[axis] / p.z).filter(|slope| slope.is_finite());
+        let slopes = seen.iter().map(|p| p[axis] / p.z);
         let (low, high) = slopes.fold((0.0f32, 0.0f32), |(low, high), s| (low.min(s), high.max(s)));
         // The field of view is at least 20 degrees wide on both sides of the axis together.
         low < -0.05 && 0.05 < high && 0.35 < high - low
     };
-    MIN_FRACTION_IN_VIEW * sample.len() as f64 <= n_in_view && fills_view(0) && fills_view(1)
+    let are_seen = MIN_FRACTION_IN_VIEW * sample.len() as f64 <= seen.len() as f64;
+    are_seen && fills_view(0) && fills_view(1)
+}
+
+/// Returns true if a depth camera sees a point at this offset, whose X points right, Y down and Z ahead.
+pub(crate) fn is_in_camera_view(offset: Vec3) -> bool {
+    offset.x.abs().max(offset.y.abs()) < MAX_CAMERA_SLOPE * offset.z
 }
 
 /// Returns at most 200,000 valid positions, evenly spread over the cloud's order.
@@ -276,7 +283,7 @@ mod tests {
     //! Inferred axes of known clouds.
 
     use super::*;
-    use crate::math::Random;
+    use crate::math::{DVec3, Random};
 
     /// Balls of points on a ground plane, Z up.
     fn things_on_the_ground() -> Vec<Vec3> {
@@ -340,18 +347,41 @@ mod tests {
         assert_eq!(inferred_with(relief, &UpConvention::YUp("OBJ".into())), Vec3::Y);
     }
 
-    #[test]
-    fn a_depth_camera_at_the_origin_has_y_down() {
+    /// Points as a depth camera at zero measures them.
+    fn depth_frame() -> Vec<Vec3> {
         let mut random = Random::new(6, 0);
         let mut next = || random.next_f32();
-        let frame = (0..5000).map(|_| {
+        let point = |_| {
             let depth = 1.0 + 2.0 * next();
             Vec3::new(depth * (next() - 0.5), depth * (next() - 0.5), depth)
-        });
-        let frame: Vec<Vec3> = frame.collect();
-        assert_eq!(inferred(frame.iter().copied()), Vec3::NEG_Y);
-        let elsewhere = frame.iter().map(|p| *p - Vec3::new(0.0, 0.0, 2.0));
+        };
+        (0..5000).map(point).collect()
+    }
+
+    #[test]
+    fn a_depth_camera_at_the_origin_has_y_down() {
+        assert_eq!(inferred(depth_frame()), Vec3::NEG_Y);
+        let elsewhere = depth_frame().into_iter().map(|p| p - 2.0 * Vec3::Z);
         assert_eq!(inferred(elsewhere), Vec3::Z);
+    }
+
+    #[test]
+    fn a_depth_camera_stands_at_the_zero_of_the_file_and_not_at_that_of_the_cloud() {
+        let up = |positions: Vec<Vec3>, origin: DVec3| {
+            let cloud = PointCloud { origin, ..PointCloud::from_positions(positions) };
+            infer_up(&cloud, &UpConvention::Unknown).up
+        };
+        let rebased = depth_frame().into_iter().map(|p| p - 2.0 * Vec3::Z).collect();
+        assert_eq!(up(rebased, 2.0 * DVec3::Z), Vec3::NEG_Y);
+        assert_eq!(up(depth_frame(), -2.0 * DVec3::Z), Vec3::Z);
+    }
+
+    #[test]
+    fn points_beside_the_view_of_a_depth_camera_do_not_widen_it() {
+        let mut beam = depth_frame();
+        beam.iter_mut().for_each(|p| *p *= Vec3::new(0.1, 0.1, 1.0));
+        beam.extend([Vec3::new(-9.0, -9.0, 1.0), Vec3::new(9.0, 9.0, 1.0)]);
+        assert!(!is_camera_frame(&beam));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::auto_viewpoint::automatic_direction;
 use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
-use super::ground::ground_axes;
+use super::ground::{direction, ground_axes};
 use super::inliers::{range_along, sample_inliers, without_fringe};
 use super::turntable::fit_turntable;
 use crate::math::{DVec3, Vec3};
@@ -41,12 +41,10 @@ fn with_extent(points: Vec<Vec3>, radius: f32) -> Vec<Vec3> {
 ///
 /// The middle of the picture looks north, rotated by `azimuth_deg` clockwise seen from above.
 pub fn panorama_camera(cloud: &PointCloud, up: Vec3, azimuth_deg: f64) -> Camera {
-    let (east, north) = ground_axes(up);
-    let (sin, cos) = azimuth_deg.to_radians().sin_cos();
     let position = cloud.origin + free_position(cloud, up).as_dvec3();
     Camera {
         position,
-        focal_point: position + sin * east.as_dvec3() + cos * north.as_dvec3(),
+        focal_point: position + direction(azimuth_deg, 0.0, up),
         view_up: up.as_dvec3(),
         projection: Projection::Panorama,
     }

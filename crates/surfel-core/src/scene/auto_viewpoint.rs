@@ -4,7 +4,7 @@ use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
 use super::corridor::view_along;
 use super::depth_map::DepthMap;
-use super::ground::ground_axes;
+use super::ground::{direction, ground_axes};
 use super::inliers::range_along;
 use crate::math::{DQuat, DVec3, Vec3};
 
@@ -15,6 +15,9 @@ const ABOVE_AZIMUTH_DEG: f64 = 180.0;
 const ABOVE_ELEVATION_DEG: f64 = 80.0;
 /// Height over width from which an object counts as upright: it has a front and a back.
 const MIN_UPRIGHT_FLATNESS: f64 = 0.6;
+/// Elevations of the viewpoint of a cloud without height and of upright objects; in between it changes with the height.
+const FLAT_ELEVATION_DEG: f64 = 40.0;
+const UPRIGHT_ELEVATION_DEG: f64 = 15.0;
 /// Height over width below which a cloud counts as terrain.
 const MAX_TERRAIN_FLATNESS: f64 = 0.25;
 
@@ -31,8 +34,10 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
         high - low
     };
     let flatness = f64::from(extent(fit.up) / extent(east).max(extent(north)).max(1e-9));
-    let elevation_deg =
-        fit.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
+    let uprightness = (flatness / MIN_UPRIGHT_FLATNESS).min(1.0);
+    let automatic_deg =
+        FLAT_ELEVATION_DEG + (UPRIGHT_ELEVATION_DEG - FLAT_ELEVATION_DEG) * uprightness;
+    let elevation_deg = fit.elevation_deg.unwrap_or(automatic_deg);
     let (azimuth_deg, elevation_deg) = if flatness < MAX_TERRAIN_FLATNESS {
         (best_fit_azimuth_deg(points, elevation_deg, fit), elevation_deg)
     } else {
@@ -175,11 +180,7 @@ fn visible_fraction(points: &[Vec3], camera: &Camera, aspect: f64) -> f64 {
 
 /// Returns the direction of view from a viewpoint at this azimuth and elevation.
 fn direction_from(azimuth_deg: f64, elevation_deg: f64, up: Vec3) -> DVec3 {
-    let (east, north) = ground_axes(up);
-    let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
-    let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
-    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), up.as_dvec3());
-    -(cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
+    -direction(azimuth_deg, elevation_deg, up)
 }
 
 #[cfg(test)]
@@ -255,7 +256,7 @@ mod tests {
         let points: Vec<Vec3> = ball.collect();
         let fit = CameraFit { aspect: 1.5, ..CameraFit::default() };
         let forward = automatic_direction(&points, &fit);
-        let expected = direction_from(FRONT_AZIMUTH_DEG, 15.0, Vec3::Z);
+        let expected = direction_from(FRONT_AZIMUTH_DEG, UPRIGHT_ELEVATION_DEG, Vec3::Z);
         assert!(forward.distance(expected) < 1e-6, "{forward}");
     }
 }

@@ -38,8 +38,7 @@ impl Clip {
     pub fn contains(&self, position: DVec3) -> bool {
         let is_inside =
             |bounds: ClipBox| bounds.min.cmple(position).all() && position.cmple(bounds.max).all();
-        let is_behind = |plane: ClipPlane| (position - plane.point).dot(plane.normal) <= 0.0;
-        self.bounds.is_none_or(is_inside) && self.plane.is_none_or(is_behind)
+        self.bounds.is_none_or(is_inside) && self.plane.is_none_or(|plane| !plane.hides(position))
     }
 
     fn is_unbounded(&self) -> bool {
@@ -50,7 +49,9 @@ impl Clip {
 impl ClipPlane {
     /// Returns true if a position is hidden. Positions on the plane are not.
     pub fn hides(&self, position: DVec3) -> bool {
-        0.0 < (position - self.point).dot(self.normal)
+        // NaN is hidden.
+        let is_kept = (position - self.point).dot(self.normal) <= 0.0;
+        !is_kept
     }
 
     /// Returns a ray that ends where the plane begins to hide, and begins where it ends. Positions of the ray are
@@ -190,6 +191,7 @@ mod tests {
         assert!(
             both.contains(DVec3::ZERO) && !both.contains(DVec3::X) && !both.contains(DVec3::NEG_X)
         );
+        assert!(!below.contains(DVec3::NAN));
         assert!(Clip::default().is_unbounded() && Clip::default().contains(DVec3::splat(1e30)));
     }
 

@@ -21,6 +21,8 @@ const MIN_ON_SIDES: f64 = 0.5;
 /// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
 /// houses that were scanned from outside have none.
 const MIN_CONTENT: f64 = 0.004;
+/// Distance from the sides of the box of points that lie well within, as a fraction of its size along each axis.
+const CONTENT_MARGIN: f32 = 0.15;
 /// Minimum height as a fraction of the longest side: flatter boxes are plates with bores rather than halls with columns.
 const MIN_HEIGHT: f32 = 0.05;
 /// Thickness of the layer that is removed with a wall, as a fraction of the room's longest side, and at most as one of the
@@ -141,7 +143,7 @@ impl Room {
         let is_within = |point: &&Vec3| {
             let local = self.local(**point);
             (0..3).all(|axis| {
-                let margin = 0.15 * self.size(axis);
+                let margin = CONTENT_MARGIN * self.size(axis);
                 self.low[axis] + margin < local[axis] && local[axis] < self.high[axis] - margin
             })
         };
@@ -200,8 +202,8 @@ impl Room {
         (0..3).all(|axis| (self.low[axis]..self.high[axis]).contains(&local[axis]))
     }
 
-    /// Returns the direction of view into the room over its lowest corner in the south, or over the next corner for
-    /// each quarter of `azimuth_deg`.
+    /// Returns the direction of view into the room over its southernmost corner, rotated by `azimuth_deg` clockwise
+    /// seen from above.
     pub fn view_direction(&self, azimuth_deg: f64, elevation_deg: Option<f64>) -> DVec3 {
         let [first, second, up] = self.axes.map(Vec3::as_dvec3);
         let (_, north) = ground_axes(self.axes[2]);

@@ -1,7 +1,7 @@
 //! Lights. A white matte surface that faces a light of unit strength has radiance 1.
 
 use super::environment::Environment;
-use super::ground::ground_axes;
+use super::ground::direction;
 use crate::math::{DQuat, Vec3};
 
 /// A light of the whole scene. [`PunctualLight`]s are attached to nodes instead.
@@ -100,11 +100,7 @@ impl Sun {
     ///
     /// North is +Y if `up` is +Z, -Z if it is +Y, and otherwise at a right angle to `up` and east.
     pub fn direction_from_angles(azimuth_deg: f32, elevation_deg: f32, up: Vec3) -> Vec3 {
-        let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
-        let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
-        let (east, north) = ground_axes(up);
-        (cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
-            .normalize()
+        direction(azimuth_deg.into(), elevation_deg.into(), up).normalize().as_vec3()
     }
 }
 

@@ -145,6 +145,11 @@ impl Material {
         ("emissive", Self::EMISSIVE),
         ("unlit", Self::UNLIT),
     ];
+
+    /// Returns the base colour of points and vertices of this colour, before textures.
+    pub fn color_over(&self, vertex_color: Vec3) -> Vec3 {
+        self.base_color * if self.ignores_vertex_colors { Vec3::ONE } else { vertex_color }
+    }
 }
 
 impl std::str::FromStr for Material {

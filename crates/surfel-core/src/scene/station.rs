@@ -3,10 +3,10 @@
 use super::direction_cells::{
     PolarPoint, density_slope, fraction_behind, polar_points, spread_within_cells,
 };
-use super::ground::ground_axes;
+use super::ground::direction;
 use super::inside_view::InsideView;
 use crate::math::{Aabb, DVec3, Vec3, quantile};
-use crate::points::{MAX_CAMERA_SLOPE, PointCloud, is_valid_position};
+use crate::points::{PointCloud, is_camera_frame, is_in_camera_view, is_valid_position};
 use std::f32::consts::TAU;
 
 /// Maximum number of points that are looked at: enough for some 40 in each cell of directions.
@@ -97,20 +97,13 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
 /// up, or `None` if its points are not those that such a camera measured.
 pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let zero = (-cloud.origin).as_vec3();
-    let points = sample(cloud);
-    if up != Vec3::NEG_Y || points.len() < MIN_POINTS {
+    let offsets: Vec<Vec3> = sample(cloud).into_iter().map(|point| point - zero).collect();
+    if up != Vec3::NEG_Y || offsets.len() < MIN_POINTS || !is_camera_frame(&offsets) {
         return None;
     }
-    let is_in_view = |point: &Vec3| {
-        let offset = *point - zero;
-        offset.x.abs().max(offset.y.abs()) < MAX_CAMERA_SLOPE * offset.z
-    };
-    if !points.iter().all(is_in_view) {
-        return None;
-    }
-    let slope_of = |point: &Vec3| ((point.y - zero.y) / (point.z - zero.z)).abs();
-    let slope = points.iter().map(slope_of).fold(0.0, f32::max);
-    let points = polar_points(zero, &points, up);
+    let in_view = offsets.iter().filter(|offset| is_in_camera_view(**offset));
+    let slope = in_view.map(|offset| (offset.y / offset.z).abs()).fold(0.0, f32::max);
+    let points = polar_points(Vec3::ZERO, &offsets, up);
     let [near, median, far] = distances(&points)?;
     let is_scan =
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
@@ -179,9 +172,7 @@ fn longest_view(points: &[PolarPoint], distance: f32, up: Vec3) -> DVec3 {
         |first: usize| (first..first + N_IN_WINDOW).map(|i| counts[i % N_STEPS]).sum::<usize>();
     // Of equally long views the northernmost comes first.
     let first = (0..N_STEPS).rev().max_by_key(|first| n_far(*first)).unwrap_or(0);
-    let azimuth_rad = ((STEP_DEG * first) as f64 + WINDOW_DEG as f64 / 2.0).to_radians();
-    let (east, north) = ground_axes(up);
-    azimuth_rad.sin() * east.as_dvec3() + azimuth_rad.cos() * north.as_dvec3()
+    direction((STEP_DEG * first) as f64 + WINDOW_DEG as f64 / 2.0, 0.0, up)
 }
 
 #[cfg(test)]
@@ -303,6 +294,15 @@ mod tests {
         let mut moved = cloud;
         moved.origin = DVec3::new(0.0, 0.0, -20.0);
         assert_eq!(find_depth_camera(&moved, Vec3::NEG_Y), None);
+    }
+
+    #[test]
+    fn a_few_stray_points_behind_a_depth_camera_do_not_hide_it() {
+        let mut cloud = depth_image(false);
+        let station = find_depth_camera(&cloud, Vec3::NEG_Y).unwrap();
+        cloud.positions.extend([Vec3::new(0.3, 0.5, -2.0); 3]);
+        let with_strays = find_depth_camera(&cloud, Vec3::NEG_Y).unwrap();
+        assert_eq!(with_strays.view_angle_deg, station.view_angle_deg);
     }
 
     #[test]

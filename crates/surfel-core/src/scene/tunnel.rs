@@ -44,7 +44,7 @@ const VIEW_ANGLE_DEG: f64 = 60.0;
 
 /// A piece of a tunnel.
 struct Slice {
-    /// Middle of the points.
+    /// Middle of the points, zero if they are too few for a closed slice.
     middle: Vec3,
     /// Distance of the wall from the middle.
     radius: f32,
@@ -82,6 +82,10 @@ pub fn find_tunnel(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
             (near, near.saturating_sub(N_SLICES_AHEAD))
         }
     };
+    let (near, far) = (nearest_closed(between, near)?, nearest_closed(between, far)?);
+    if near == far {
+        return None;
+    }
     let (near, far) = (between[near].middle, between[far].middle);
     let ahead = (far - near).as_dvec3();
     Some(InsideView {
@@ -90,6 +94,12 @@ pub fn find_tunnel(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
         distance: ahead.length(),
         view_angle_deg: VIEW_ANGLE_DEG,
     })
+}
+
+/// Returns the index of the closed slice that is nearest to the one at `slice_idx`, or `None` if none is closed.
+fn nearest_closed(slices: &[Slice], slice_idx: usize) -> Option<usize> {
+    let closed = (0..slices.len()).filter(|other| slices[*other].is_closed);
+    closed.min_by_key(|other| other.abs_diff(slice_idx))
 }
 
 /// Returns the slices, but those at the ends, that have many points for the tunnel.
@@ -263,6 +273,18 @@ mod tests {
         let view = view(tunnel().into_iter().map(bent).collect()).unwrap();
         let middle = bent(view.position.as_vec3().with_y(0.0).with_z(0.0));
         assert!(view.position.as_vec3().distance(middle) < 0.5, "{view:?}");
+    }
+
+    #[test]
+    fn a_gap_without_points_is_neither_looked_from_nor_looked_at() {
+        // The gaps are where the camera would stand, and where it would look. The tunnel is beside the cloud's zero.
+        for gaps in [vec![5.0f32..10.0, 90.0..95.0], vec![28.0..36.0]] {
+            let is_kept = |p: &Vec3| !gaps.iter().any(|gap| gap.contains(&p.x));
+            let kept = tunnel().into_iter().filter(is_kept);
+            let view = view(kept.map(|p| p + 50.0 * Vec3::Y).collect()).unwrap();
+            assert!(0.99 < view.direction.x.abs(), "{gaps:?}: {view:?}");
+            assert!((view.position.y - 50.0).abs() < 0.3, "{gaps:?}: {view:?}");
+        }
     }
 
     #[test]

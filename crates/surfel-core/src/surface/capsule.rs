@@ -4,6 +4,9 @@ use super::shape::{PointLanes, RayLanes, Shape};
 use crate::math::{Aabb, Floats, Vec3};
 use crate::points::CAPSULE_ASPECT;
 
+/// Square of the sine between a ray and the axis of a capsule below which they are parallel.
+pub const MIN_ACROSS: f32 = 1e-6;
+
 /// The shape of a capsule. The point's radius is half the length, its normal the direction.
 pub struct Capsule;
 
@@ -25,7 +28,7 @@ impl Shape for Capsule {
         let half_linear = zero - height * slope;
         let constant = from_center.dot(from_center) - height * height - thickness * thickness;
         let discriminant = half_linear * half_linear - across * constant;
-        let is_parallel = across.lt(F::splat(1e-6));
+        let is_parallel = across.lt(F::splat(MIN_ACROSS));
         let side = (zero - half_linear - discriminant.max(zero).sqrt()) / across;
         let at = height + side * slope;
         // A ray along the axis meets the cap that faces it.

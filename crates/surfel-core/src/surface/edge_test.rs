@@ -19,6 +19,8 @@ pub const HEIGHT_STEPS: f32 = 1.0;
 /// Angle in radians by which half of the directions are rotated: thirty times the rounding error of a
 /// direction, and far too small to be visible.
 pub const TIE_BREAK_ANGLE: f32 = 4e-6;
+/// Square of the distance from a hit in the tangent plane, in radii, up to which a neighbour has no direction.
+pub const MIN_SQUARED_OFFSET: f32 = 1e-6;
 /// A neighbourhood of fewer points is sparse and has to be evaluated again at a larger radius. With 8 the
 /// depth error of the bunny grew by a sixth; with 4 there were holes at radii of 0.85 spacings.
 pub const MIN_DENSE: u32 = 5;
@@ -134,7 +136,7 @@ impl<F: Floats> CandidateHitLanes<F> {
     fn project_to_tangent_plane(&self, offset: Vec3Lanes<F>) -> ([F; 2], F::Mask) {
         let zero = F::splat(0.0);
         let [x, y] = [offset.dot(self.tangents[0]), offset.dot(self.tangents[1])];
-        let min_squared = F::splat(1e-6) * self.radius * self.radius;
+        let min_squared = F::splat(MIN_SQUARED_OFFSET) * self.radius * self.radius;
         let is_below = y.lt(zero) | y.le(zero) & x.lt(zero);
         let angle = F::select(is_below, F::splat(TIE_BREAK_ANGLE), zero);
         ([x - angle * y, y + angle * x], min_squared.lt(x * x + y * y))

@@ -1,14 +1,13 @@
 //! The field of weighted planes: at each position the mean of the signed distances from the planes of the points
 //! around, whose zeros are the surface (Wald and Seidel, Interactive Ray Tracing of Point-based Models, 2005).
 
+use super::align::MIN_ALIGNED_COSINE;
 use crate::math::{Aabb, Floats, Vec3};
 
 /// Radius of a point's weight function, in radii of the point.
 pub const FIELD_SUPPORT: f32 = 1.2;
 /// Minimum weight of all points at a position where the field has a value.
 pub const MIN_FIELD_WEIGHT: f32 = 0.05;
-/// Cosine between two normals from which on their sides are compared by the normals themselves.
-const MIN_ALIGNED_COSINE: f32 = 0.5;
 
 /// A point of the field.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,15 +18,6 @@ pub struct FieldPoint {
     pub normal: Vec3,
     /// Radius of the weight function, 0 where there is no point.
     pub support: f32,
-}
-
-/// Returns the weight of a point at a squared distance, which falls from 1 to 0 at the support's radius.
-#[inline(always)]
-pub fn field_weight<F: Floats>(squared_distance: F, inverse_support_squared: F) -> F {
-    let one = F::splat(1.0);
-    let inside = (one - squared_distance * inverse_support_squared).max(F::splat(0.0));
-    let squared = inside * inside;
-    squared * squared
 }
 
 /// Sums over points, whose quotient is the field.

@@ -132,8 +132,8 @@ impl SurfaceKind {
         }
     }
 
-    /// Returns the reciprocal of the cosine to the normal from which on rays toward lights ignore no hits, or 0 if all ignore
-    /// those within the spawn distance.
+    /// Returns the rate at which the skipped distance of rays toward lights shrinks with their cosine to the normal, or
+    /// 0 if all skip the spawn distance.
     pub fn light_steepness(self) -> f32 {
         match self {
             Self::Smooth | Self::Implicit => smooth::LIGHT_STEEPNESS,

@@ -38,14 +38,6 @@ impl Shape for Ball {
     }
 }
 
-/// Returns the weight of points at `offset`, which falls from 1 to 0 at the support's radius.
-#[inline(always)]
-pub fn weight<F: Floats>(offset: Vec3Lanes<F>, inverse_support: F) -> F {
-    let inside = (F::splat(1.0) - offset.dot(offset) * inverse_support).max(F::splat(0.0));
-    let squared = inside * inside;
-    squared * squared
-}
-
 /// Weighted sums over the points around positions, one position per lane.
 pub struct PlaneSums<F> {
     weight: F,

@@ -2,6 +2,7 @@
 //! surfaces, Guennebaud and Gross 2007). Weights also fall with the angle between normals, which keeps edges
 //! (robust implicit moving least squares, Öztireli, Guennebaud and Gross 2009).
 
+use super::weight::support_weight;
 use crate::math::{Floats, Lanes, ROUND_TO_INTEGER, Vec3, Vec3Lanes};
 
 /// Radius of a point's weight function, in radii of the point.
@@ -12,12 +13,16 @@ pub const FIT_REACH: f32 = 1.4;
 pub const SPAWN_OFFSET: f32 = 0.2;
 /// The distance before which secondary rays ignore hits, in radii.
 pub const SPAWN_T_MIN: f32 = 0.5;
-/// Reciprocal of the cosine to the normal from which on a ray toward a light ignores none: it meets the wall beside a floor,
-/// so that no light leaks in between.
+/// Rate at which the skipped distance of light rays shrinks with the cosine to the normal: all of [`SPAWN_T_MIN`] in
+/// the tangent plane, nothing from a cosine of 1/2 on. A steeper ray must not skip the wall beside a floor, or light
+/// leaks in.
 pub const LIGHT_STEEPNESS: f32 = 2.0;
 /// Distance from the origin of a ray, in radii of the disc that it hits, up to which the ray leaves the surface if it comes
 /// from behind the disc: at an edge the discs of one side stick out before the other.
 pub const LEAVING_DISTANCE: f32 = 1.0;
+/// Minimum distance between a disc and what a ray hits behind it, in radii of the disc, at which the ray has come through
+/// a slit. Nearer back faces are those of thin sheets.
+pub const MIN_SLIT_DEPTH: f32 = 3.0;
 /// Factors of `edge_retest_factor` for evenly spaced and for random points.
 const EDGE_RETEST_EVEN: f32 = 1.3;
 const EDGE_RETEST_RANDOM: f32 = 1.5;
@@ -51,6 +56,8 @@ pub const MIN_EDGE_WEIGHT: f32 = 0.05;
 pub const MAX_OVERHANG: f32 = 0.1;
 /// Maximum distance along the ray from the position of a fit to the sphere, in radii.
 pub const MAX_STEP: f32 = 1.5;
+/// Length of a fitted sphere's gradient up to which a ray hits nothing.
+pub const MIN_GRADIENT: f32 = 1e-3;
 
 /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose, by how
 /// evenly the points are placed: the distance between the nearest of eight points in radii. Between unevenly placed
@@ -92,17 +99,14 @@ pub struct FitPoint<F> {
     /// Unit normal.
     pub normal: Vec3Lanes<F>,
     /// Reciprocal of the square of the support's radius.
-    pub inverse_support: F,
+    pub inverse_support_squared: F,
 }
 
 impl<F: Floats> FitPoint<F> {
     /// Returns the weight of the point, which falls from 1 at the position to 0 at the support's radius.
     #[inline(always)]
     pub fn weight(&self) -> F {
-        let one = F::splat(1.0);
-        let inside = (one - self.offset.dot(self.offset) * self.inverse_support).max(F::splat(0.0));
-        let squared = inside * inside;
-        squared * squared
+        support_weight(self.offset.dot(self.offset), self.inverse_support_squared)
     }
 }
 
@@ -174,7 +178,7 @@ impl<F: Floats> SphereSums<F> {
         let is_hit = F::splat(MIN_WEIGHT * STEPS).le(self.weight)
             & zero.le(discriminant)
             & is_near
-            & F::splat(1e-3).lt(length);
+            & F::splat(MIN_GRADIENT).lt(length);
         SphereHit { step: step / self.per_radius, normal: normal.scaled(one / length), is_hit }
     }
 }
@@ -184,7 +188,7 @@ impl<F: Floats> PointSums<F> for SphereSums<F> {
     fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
         let squared = point.offset.dot(point.offset);
         is_within_reach(point, self.per_radius)
-            & (squared * point.inverse_support).lt(F::splat(1.0))
+            & (squared * point.inverse_support_squared).lt(F::splat(1.0))
     }
 
     /// The point's normal is turned to the side of the guide.
@@ -376,7 +380,7 @@ mod tests {
         FitPoint {
             offset: Vec3Lanes::splat(offset),
             normal: Vec3Lanes::splat(normal),
-            inverse_support: 1.0 / (SUPPORT_FACTOR * SUPPORT_FACTOR),
+            inverse_support_squared: 1.0 / (SUPPORT_FACTOR * SUPPORT_FACTOR),
         }
     }
 

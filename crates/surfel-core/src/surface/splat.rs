@@ -10,6 +10,9 @@ pub const MAX_GATHERED: usize = 16;
 /// along the ray are kept: points that lie thousands over each other cost no more.
 pub const MAX_CANDIDATES: usize = 128;
 
+/// Minimum weight of a disc, at its rim.
+pub const MIN_DISC_WEIGHT: f32 = 1e-4;
+
 /// A point of a cloud as a disc with colour.
 #[derive(Clone, Copy, Debug)]
 pub struct Surfel {
@@ -95,7 +98,7 @@ impl<F: Floats> SplatAccumulator<F> {
     pub fn add(&mut self, disc: &Surfel, distance: F, offset: Vec3Lanes<F>, is_hit: F::Mask) {
         let zero = F::splat(0.0);
         let nearness = F::splat(1.0) - offset.dot(offset).sqrt() / F::splat(disc.radius);
-        let weight = F::select(is_hit, nearness.max(F::splat(1e-4)), zero);
+        let weight = F::select(is_hit, nearness.max(F::splat(MIN_DISC_WEIGHT)), zero);
         let normal = Vec3Lanes::splat(disc.normal);
         let sign = match self.kind {
             SurfaceKind::Splat => {

@@ -21,6 +21,7 @@ const SETTINGS: Settings = Settings {
     width: 48,
     height: 40,
     samples_per_pixel: 2,
+    noise_threshold: 0.0,
     light_samples: 4,
     max_depth: 6,
     seed: 5,

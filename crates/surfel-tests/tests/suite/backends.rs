@@ -31,6 +31,7 @@ pub const SETTINGS: Settings = Settings {
     width: 80,
     height: 60,
     samples_per_pixel: 4,
+    noise_threshold: 0.0,
     light_samples: 8,
     max_depth: 8,
     seed: 7,

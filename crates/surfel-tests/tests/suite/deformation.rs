@@ -19,6 +19,7 @@ const SETTINGS: Settings = Settings {
     width: 64,
     height: 64,
     samples_per_pixel: 4,
+    noise_threshold: 0.0,
     light_samples: 1,
     max_depth: 2,
     seed: 9,

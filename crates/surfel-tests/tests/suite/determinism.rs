@@ -18,6 +18,7 @@ const SETTINGS: Settings = Settings {
     width: 70,
     height: 50,
     samples_per_pixel: 4,
+    noise_threshold: 0.0,
     light_samples: 8,
     max_depth: 8,
     seed: 3,
@@ -133,6 +134,34 @@ fn regions_make_the_whole_picture() {
             assert!(difference < 1e-5, "{name}, pixel {pixel}");
         }
     }
+}
+
+#[test]
+fn pictures_of_fewer_samples_do_not_depend_on_threads_or_regions() {
+    let flat = FlatScene::new(&scene(SurfaceKind::Smooth), &NoProgress).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    let all = Settings { samples_per_pixel: 64, light_samples: 64, ..SETTINGS };
+    let settings = Settings { noise_threshold: 0.02, ..all };
+    let whole = |settings: &Settings, n_threads: usize| {
+        let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        pool.install(|| renderer.render(&flat, settings, &NoProgress).unwrap())
+    };
+    let ((image, stats), (reference, all_stats)) = (whole(&settings, 1), whole(&all, 2));
+    assert!(whole(&settings, 3).0 == image);
+    let [fewer, most] = [stats, all_stats].map(|stats| stats.rays.primary);
+    assert!(most / 8 < fewer && fewer < most * 3 / 4, "{fewer} of {most} rays");
+    let brightness = |color: &[f32; 4]| color[..3].iter().sum::<f32>() / 3.0;
+    let errors = image.color.iter().zip(&reference.color).map(|(found, expected)| {
+        let [found, expected] = [found, expected].map(brightness);
+        (found - expected).powi(2) / expected.max(0.01)
+    });
+    let error = (errors.sum::<f32>() / image.color.len() as f32).sqrt();
+    assert!(0.0 < error && error < 0.02, "{error}");
+    let (rows, columns) = ((11, 47), (5, 44));
+    let region = RenderRegion { rows, columns, ..RenderRegion::whole(&settings) };
+    let part = renderer.render_region(&flat, &settings, region, &NoProgress).unwrap().0;
+    assert!(part == image.cropped(rows, columns));
+    assert_eq!((part.width, part.height), (39, 36));
 }
 
 #[test]

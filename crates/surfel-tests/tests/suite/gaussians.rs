@@ -248,6 +248,7 @@ const SETTINGS: Settings = Settings {
     width: 33,
     height: 33,
     samples_per_pixel: 1,
+    noise_threshold: 0.0,
     light_samples: 1,
     max_depth: 2,
     seed: 0,

@@ -19,6 +19,7 @@ const SETTINGS: Settings = Settings {
     width: 64,
     height: 64,
     samples_per_pixel: 1,
+    noise_threshold: 0.0,
     light_samples: 16,
     max_depth: 8,
     seed: 1,
@@ -250,8 +251,28 @@ fn the_environment_is_seen_behind_points() {
         for corner in [0, 63, 63 * 64, 64 * 64 - 1] {
             assert_eq!(points.color[corner], splats.color[corner]);
             assert_eq!(points.color[corner][3], 1.0);
+            assert_eq!((points.coverage[corner], splats.coverage[corner]), (0.0, 0.0));
         }
     }
+}
+
+#[test]
+fn a_material_without_vertex_colors_and_its_emission_are_seen_on_rasterised_points() {
+    let picture = |material: Material| {
+        let geometry = scenes::points(clouds::sphere(2000, 1.0), SurfaceKind::Points);
+        let mut scene = scenes::lit(geometry);
+        scene.graph.materials[0] = material;
+        scenes::render(&scene, &SETTINGS)
+    };
+    let green = Vec3::new(0.0, 0.5, 0.0);
+    let emissive = Vec3::new(1.0, 0.0, 0.0);
+    let plain = Material { base_color: green, ignores_vertex_colors: true, ..Material::MATTE };
+    let (dark, bright) = (picture(plain.clone()), picture(Material { emissive, ..plain }));
+    let center = 32 * 64 + 32;
+    let albedo = dark.aovs.as_ref().unwrap().albedo[center];
+    assert_eq!(albedo, green);
+    let [emitted, ..] = [0, 1, 2].map(|i| bright.color[center][i] - dark.color[center][i]);
+    assert!((emitted - 1.0).abs() < 1e-6, "{emitted}");
 }
 
 /// A round point behind a panorama's camera continues from one edge of the picture to the other.

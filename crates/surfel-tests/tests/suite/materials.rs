@@ -16,6 +16,7 @@ pub const SETTINGS: Settings = Settings {
     width: 32,
     height: 32,
     samples_per_pixel: 1,
+    noise_threshold: 0.0,
     light_samples: 16,
     max_depth: 8,
     seed: 1,

@@ -75,6 +75,7 @@ fn picture(kind: SurfaceKind, renderer: &dyn Renderer) -> Image {
         width: SIZE.0,
         height: SIZE.1,
         samples_per_pixel: 4,
+        noise_threshold: 0.0,
         light_samples: 16,
         max_depth: 8,
         seed: 0,

@@ -1,13 +1,13 @@
 //! The smooth surface: its depth and normals where these are known, and one surface for rays of all kinds.
 
 use crate::rays::hits;
-use surfel_core::flat::FlatCloud;
+use surfel_core::flat::{FlatCloud, FlatScene};
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::{PointCloud, Preparation, prepare};
 use surfel_core::progress::NoProgress;
-use surfel_core::scene::CloudGeometry;
+use surfel_core::scene::{CloudGeometry, Geometry, Material, Scene};
 use surfel_core::surface::SurfaceKind;
-use surfel_core::trace::{Simd, SurfaceHit, occlusions};
+use surfel_core::trace::{InstanceFilter, SceneHit, Simd, SurfaceHit, occlusions, scene_hits};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -166,6 +166,29 @@ fn rays_end_at_slits_where_front_sides_are_known() {
     single.has_front_sides = true;
     let through = heights_at(&single, in_slit);
     assert!(through.iter().all(|z| *z == f32::NEG_INFINITY), "{through:?}");
+}
+
+#[test]
+fn slits_close_before_whatever_else_is_behind_them() {
+    let mut sheet = sheet_with_slit(0.25, true);
+    sheet.has_front_sides = true;
+    let between = scenes::floor(-0.5, 1.0);
+    let mut geometries = vec![
+        (Geometry::Points(sheet.clone()), Material::MATTE),
+        (Geometry::Triangles(between), Material::MATTE),
+    ];
+    for _ in 0..2 {
+        geometries.reverse();
+        let graph = scenes::graph(geometries.clone());
+        let flat =
+            FlatScene::new(&Scene { graph, ..scenes::lit(sheet.clone()) }, &NoProgress).unwrap();
+        let x = 1.2 * SLIT_SPACING;
+        let ray = |i: i32| Ray::new(Vec3::new(x, 0.001 * i as f32, 3.0), -Vec3::Z);
+        let rays: Vec<Ray> = (-100..100).map(ray).collect();
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        scene_hits(&flat, Simd::detect(), InstanceFilter::All, &rays, &mut hits);
+        assert!(hits.iter().all(|hit| (hit.distance - 3.0).abs() < 0.01), "{:?}", hits[0]);
+    }
 }
 
 #[test]

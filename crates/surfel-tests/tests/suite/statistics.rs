@@ -29,6 +29,7 @@ const SETTINGS: Settings = Settings {
     width: SIDE,
     height: SIDE,
     samples_per_pixel: 1,
+    noise_threshold: 0.0,
     light_samples: 4,
     max_depth: 2,
     seed: 0,

@@ -17,6 +17,7 @@ const SETTINGS: Settings = Settings {
     width: 48,
     height: 48,
     samples_per_pixel: 1,
+    noise_threshold: 0.0,
     light_samples: 1,
     max_depth: 2,
     seed: 0,

@@ -4,7 +4,7 @@ use crate::flat::points::FlatPoints;
 use crate::math::{Aabb, LANES, Vec3, Vec3Lanes, hash};
 use crate::surface::{
     CandidateHit, CandidateHitLanes, FIELD_SUPPORT, FieldPoint, FieldSums, NeighborhoodStats,
-    field_weight,
+    support_weight,
 };
 use rayon::prelude::*;
 
@@ -70,7 +70,7 @@ impl FieldPoints {
             let point = &self.points[*slot as usize];
             let offset = position - point.center;
             let squared = offset.length_squared();
-            let weight = field_weight(squared, 1.0 / (point.support * point.support));
+            let weight = support_weight(squared, 1.0 / (point.support * point.support));
             let side = if *is_flipped { -point.normal } else { point.normal };
             sums.add(weight, side.dot(offset));
             normal += weight * side;
@@ -106,7 +106,7 @@ impl FieldPoints {
             for i in 0..LANES {
                 let offset = [x[i] - center.x, y[i] - center.y, z[i] - center.z];
                 let squared = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-                let weight = field_weight(squared, inverse);
+                let weight = support_weight(squared, inverse);
                 let height = side.x * offset[0] + side.y * offset[1] + side.z * offset[2];
                 weights[i] += weight;
                 heights[i] += weight * height;

@@ -87,7 +87,7 @@ pub(crate) fn indices_by_spacing(
     progress: &dyn Progress,
 ) -> Result<Vec<u32>> {
     progress.begin("spacing", positions.len() as u64);
-    // The place in `kept` of the last point of each cell, and of the point of the same cell before each point.
+    // The index in `kept` of the last point of each cell, and of the point of the same cell before each point.
     let mut cells: HashMap<[i64; 3], usize, CellHash> = HashMap::default();
     let mut before: Vec<Option<usize>> = Vec::new();
     let mut kept: Vec<u32> = Vec::new();

@@ -5,12 +5,12 @@
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
 use super::depth_steps::DepthSteps;
-use super::flat_faces::{FlatFaces, Witnesses};
+use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::{GROUP_SIZE, Noise};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
-use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
 use crate::points::normals::jets::fit_wide_jet;
 use crate::points::normals::planes::fit_plane;
 use crate::points::structure::above_land::is_above_land;
@@ -46,7 +46,7 @@ pub enum Denoise {
     /// Noisy surfaces without radii, and points on straight lines, are denoised.
     #[default]
     Auto,
-    /// All points are moved.
+    /// Points are moved however little noise there is; plants, points that fill space and animated clouds stay.
     On,
     /// All points stay where they are.
     Off,
@@ -130,7 +130,7 @@ pub fn denoise(
     };
     let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
     let (mut moved_points, mut normals) = (positions.clone(), vec![Vec3::ZERO; positions.len()]);
-    let results = moved(&tree, &groups, &order, &counts, &noises, progress)?;
+    let results = project_points(&tree, &groups, &order, &counts, &noises, progress)?;
     for (point, (position, normal)) in order.iter().zip(results) {
         moved_points[*point as usize] = position;
         normals[*point as usize] = normal;
@@ -166,10 +166,11 @@ fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
     order.par_chunks(GROUP_SIZE).map(mean).collect()
 }
 
-/// Returns the points moved onto their surface, and their normals, zero where no cubic follows the points. `groups` are
-/// the means of each [`GROUP_SIZE`] points in their order, `seeds` decide which faces of walls are tried, `counts` are the
-/// numbers of neighbours that take part, zero for points that stay, and `noises` the noise in spacings where it is known.
-fn moved(
+/// Projects points onto their surface, and returns them with their normals, zero where no cubic follows the points.
+/// `groups` are the means of each [`GROUP_SIZE`] points in their order, `seeds` decide which faces of walls are tried,
+/// `counts` are the numbers of neighbours that take part, zero for points that stay, and `noises` the noise in spacings
+/// where it is known.
+fn project_points(
     tree: &KdTree,
     groups: &KdTree,
     seeds: &[u32],
@@ -193,9 +194,9 @@ fn moved(
         normal => normal,
     };
     let faces = FlatFaces::find(tree, counts, noises, normal_of, progress)?;
-    let places = faces.tree(progress)?;
+    let face_tree = faces.tree(progress)?;
     progress.begin("denoise", positions.len() as u64);
-    let moved = |(point, position): (usize, &Vec3)| {
+    let project_point = |(point, position): (usize, &Vec3)| {
         if point.is_multiple_of(1024) {
             progress.check()?;
             progress.advance(1024.min(positions.len() - point) as u64);
@@ -205,31 +206,31 @@ fn moved(
             return Ok((*position, Vec3::ZERO));
         }
         let noise = noises[point].unwrap_or_default();
-        let witnesses = || Witnesses::around(tree, point, count as usize, noise);
-        if let Some(moved) = faces.moved(&places, *position, witnesses) {
-            return Ok(moved);
+        let support_points = || SupportPoints::around(tree, point, count as usize, noise);
+        if let Some(projected) = faces.project(&face_tree, *position, support_points) {
+            return Ok(projected);
         }
         let is_grouped = MIN_GROUPED <= count;
         let is_uneven = match is_grouped {
             true => groups.is_uneven_at(*position),
             false => points.is_uneven[point],
         };
-        if is_uneven && let Some(moved) = moved_onto_face(tree, point, seeds[point]) {
-            return Ok((moved, Vec3::ZERO));
+        if is_uneven && let Some(projected) = project_to_face(tree, point, seeds[point]) {
+            return Ok((projected, Vec3::ZERO));
         }
         if is_grouped {
             let count = count.div_ceil(GROUP_SIZE as u32);
-            return Ok((groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO));
+            return Ok((groups.project(*position, count, GROUP_SIZE as f32), Vec3::ZERO));
         }
         let jet = fit_wide_jet(tree, point, points.normals[point], noise);
         let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
-        Ok((points.moved(*position, count, 1.0), normal))
+        Ok((points.project(*position, count, 1.0), normal))
     };
-    positions.par_iter().enumerate().map(moved).collect()
+    positions.par_iter().enumerate().map(project_point).collect()
 }
 
-/// Returns a point of a thin wall moved onto its own face, or `None` where its neighbours show none.
-fn moved_onto_face(tree: &KdTree, point: usize, seed: u32) -> Option<Vec3> {
+/// Projects a point of a thin wall onto its own face; returns `None` where its neighbours show none.
+fn project_to_face(tree: &KdTree, point: usize, seed: u32) -> Option<Vec3> {
     let positions = tree.positions();
     let position = positions[point];
     let neighbors = tree.nearest(position, N_FACE_NEIGHBORS, Some(point as u32));
@@ -320,20 +321,20 @@ impl<'a> Layer<'a> {
         (if cosine < 0.0 { -other } else { other }, similarity)
     }
 
-    /// Returns a position moved onto the surface along the normal of the nearest point. Each neighbour stands for
+    /// Projects a position onto the surface along the normal of the nearest point. Each neighbour stands for
     /// `group_size` points.
-    fn moved(&self, position: Vec3, count: u32, group_size: f32) -> Vec3 {
+    fn project(&self, position: Vec3, count: u32, group_size: f32) -> Vec3 {
         let neighbors = self.neighbors(position, count);
         let Some(nearest) = neighbors.points.first() else { return position };
         let normal = self.normals[nearest.index as usize];
         let n_points = group_size * count as f32;
-        let noise = n_points / NEIGHBORS_PER_NOISE * (std::f32::consts::PI / n_points).sqrt();
+        let noise = n_points / NEIGHBORS_PER_NOISE * spacing_per_reach(n_points);
         let max_height = MAX_HEIGHT * MAX_HEIGHT * noise * noise;
-        let mut moved = position;
+        let mut projected = position;
         for _ in 0..N_MOVES {
             let (mut sum, mut weight) = (0.0, 0.0);
             for neighbor in &neighbors.points {
-                let offset = moved - self.tree.positions()[neighbor.index as usize];
+                let offset = projected - self.tree.positions()[neighbor.index as usize];
                 let (other, similarity) = self.similar_normal(neighbor, normal);
                 // The mean of both normals: this height is zero for any two points of a sphere.
                 let height = 0.5 * (normal + other).dot(offset);
@@ -345,10 +346,10 @@ impl<'a> Layer<'a> {
                 weight += own;
             }
             if 0.0 < weight {
-                moved -= normal * (sum / weight);
+                projected -= normal * (sum / weight);
             }
         }
-        moved
+        projected
     }
 }
 

@@ -8,7 +8,7 @@ use crate::points::normals::jets::cubic_residual;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// Number of points, among as many as take part on other surfaces, that are asked for the plane around them.
+/// Number of planes that are fitted per neighbourhood: of `count` neighbours, every `count / 3`-th point gets one.
 const SAMPLES_PER_NEIGHBORS: usize = 3;
 /// Numbers of neighbours, in multiples of those of other surfaces, and the greatest root mean square height, in standard
 /// deviations of the noise, of the cubic through them over their plane. Each plane starts from the one before; the first
@@ -32,8 +32,8 @@ const MIN_WIDTH: f64 = 0.1;
 const MAX_VARIANCE_RATIO: f32 = 1.8;
 /// Number of planes around a point among which that of its face is sought.
 const N_NEAREST: usize = 48;
-/// Minimum number of neighbours that tell the planes on which a point may be.
-const MIN_WITNESSES: usize = 24;
+/// Minimum number of neighbours that decide on which planes a point may be.
+const MIN_SUPPORT_POINTS: usize = 24;
 /// Minimum fraction of them on a plane.
 const MIN_ON_PLANE: f32 = 0.3;
 /// Maximum number of points, for each plane of a face, around which the face bends.
@@ -59,7 +59,7 @@ struct Plane {
 
 /// The surface around a point.
 #[derive(Clone, Copy)]
-enum Around {
+enum LocalSurface {
     Flat(Plane),
     /// A surface that bends, with the point.
     Bent(Vec3),
@@ -68,9 +68,9 @@ enum Around {
 /// The flat faces of a cloud.
 pub struct FlatFaces {
     /// The surface around some of the points.
-    samples: Vec<Around>,
+    samples: Vec<LocalSurface>,
     /// Positions of these.
-    places: Vec<Vec3>,
+    sample_positions: Vec<Vec3>,
 }
 
 impl FlatFaces {
@@ -108,74 +108,77 @@ impl FlatFaces {
             }
             let noise = noises[*point].unwrap_or_default() * spacing(&neighbors[..count]);
             let start = Plane { middle: position, normal, reach: 0.0 };
-            Ok(Around::new(positions, start, &neighbors, count, noise))
+            Ok(LocalSurface::new(positions, start, &neighbors, count, noise))
         };
         let found = asked.par_iter().enumerate().map(around).collect::<Result<Vec<_>>>()?;
-        let samples: Vec<Around> = found.into_iter().flatten().collect();
-        let place = |sample: &Around| match sample {
-            Around::Flat(plane) => plane.middle,
-            Around::Bent(position) => *position,
+        let samples: Vec<LocalSurface> = found.into_iter().flatten().collect();
+        let position = |sample: &LocalSurface| match sample {
+            LocalSurface::Flat(plane) => plane.middle,
+            LocalSurface::Bent(position) => *position,
         };
-        let places = samples.iter().map(place).collect();
-        Ok(Self { samples, places })
+        let sample_positions = samples.iter().map(position).collect();
+        Ok(Self { samples, sample_positions })
     }
 
-    /// Returns the tree over the places where the surface is known.
+    /// Returns the tree over the positions at which the surface is known.
     ///
     /// # Errors
     ///
     /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
     pub fn tree(&self, progress: &dyn Progress) -> Result<KdTree<'_>> {
-        KdTree::new(&self.places, progress)
+        KdTree::new(&self.sample_positions, progress)
     }
 
-    /// Returns a point moved onto the plane of its face, or onto the edge if it lies beyond, and the normal of the face,
-    /// zero near an edge. Returns none if the point is on no flat face.
+    /// Projects a point onto the plane of its face, or onto the edge if it lies beyond, and returns it with the normal
+    /// of the face, zero near an edge. Returns none if the point is on no flat face.
     ///
-    /// `places` is [`Self::tree`]. The `witnesses` around the point are asked for only if a flat face is near.
-    pub fn moved(
+    /// `sample_positions` is [`Self::tree`]. The `support_points` around the point are collected only if a flat face is
+    /// near.
+    pub fn project(
         &self,
-        places: &KdTree,
+        sample_positions: &KdTree,
         position: Vec3,
-        witnesses: impl FnOnce() -> Witnesses,
+        support_points: impl FnOnce() -> SupportPoints,
     ) -> Option<(Vec3, Vec3)> {
-        let (planes, bent) = self.near(places, position);
+        let (planes, bent) = self.near(sample_positions, position);
         if planes.is_empty() {
             return None;
         }
-        let witnesses = witnesses();
-        let mut faces = witnesses.faces(planes, &bent, position);
-        faces.retain(|face| witnesses.is_on(face, position));
+        let support_points = support_points();
+        let mut faces = support_points.faces(planes, &bent, position);
+        faces.retain(|face| support_points.is_on(face, position));
         let height = |face: &Plane| face.height(position).abs();
         let own = *faces.iter().min_by(|a, b| height(a).total_cmp(&height(b)))?;
         faces.retain(|other| own.normal.dot(other.normal).abs() < MAX_EDGE);
-        let mut moved = position - own.normal * own.height(position);
+        let mut projected = position - own.normal * own.height(position);
         for other in &faces {
-            if witnesses.is_beyond(&own, other, moved) {
+            if support_points.is_beyond(&own, other, projected) {
                 let along = other.normal.reject_from(own.normal).normalize();
-                moved -= along * (other.height(moved) / along.dot(other.normal));
+                projected -= along * (other.height(projected) / along.dot(other.normal));
             }
         }
-        Some((moved, if faces.is_empty() { own.normal } else { Vec3::ZERO }))
+        Some((projected, if faces.is_empty() { own.normal } else { Vec3::ZERO }))
     }
 
-    /// Returns the planes that are known at a position, each with its distance, and the places around it where the surface
-    /// bends.
-    fn near(&self, places: &KdTree, position: Vec3) -> (Vec<(Plane, f32)>, Vec<Vec3>) {
+    /// Returns the planes that are known at a position, each with its distance, and the positions around it where the
+    /// surface bends.
+    fn near(&self, sample_positions: &KdTree, position: Vec3) -> (Vec<(Plane, f32)>, Vec<Vec3>) {
         let (mut planes, mut bent) = (Vec::new(), Vec::new());
-        for sample in places.nearest(position, N_NEAREST, None) {
+        for sample in sample_positions.nearest(position, N_NEAREST, None) {
             let distance = sample.distance_squared.sqrt();
             match self.samples[sample.index as usize] {
-                Around::Flat(plane) if distance < plane.reach => planes.push((plane, distance)),
-                Around::Flat(_) => {}
-                Around::Bent(place) => bent.push(place),
+                LocalSurface::Flat(plane) if distance < plane.reach => {
+                    planes.push((plane, distance));
+                }
+                LocalSurface::Flat(_) => {}
+                LocalSurface::Bent(position) => bent.push(position),
             }
         }
         (planes, bent)
     }
 }
 
-impl Around {
+impl LocalSurface {
     /// Returns the surface around a point from its neighbours, nearest first: flat if noise of the standard deviation `noise`
     /// explains their distances from a plane, bent if not, none if no plane passes through enough of them. `start` is a
     /// rough plane, and `count` the number of neighbours that take part on other surfaces.
@@ -283,18 +286,18 @@ impl Plane {
     }
 }
 
-/// The neighbours of a point, which tell the faces that it may be on.
-pub struct Witnesses {
+/// The neighbours of a point, which decide on which faces it may be.
+pub struct SupportPoints {
     positions: Vec<Vec3>,
     /// Standard deviation of the noise.
     noise: f32,
 }
 
-impl Witnesses {
+impl SupportPoints {
     /// Returns the neighbours of a point: as many as take part on other surfaces, or more. `noise` is in spacings.
     pub fn around(tree: &KdTree, point: usize, count: usize, noise: f32) -> Self {
         let positions = tree.positions();
-        let n_neighbors = MIN_WITNESSES.max(count);
+        let n_neighbors = MIN_SUPPORT_POINTS.max(count);
         let neighbors = tree.nearest(positions[point], n_neighbors, Some(point as u32));
         let noise = noise * spacing(&neighbors);
         let position = |neighbor: &Neighbor| positions[neighbor.index as usize];
@@ -302,7 +305,7 @@ impl Witnesses {
     }
 
     /// Returns the mean plane of each face on which enough of the neighbours lie. `planes` are those near `position`, with
-    /// their distances, and `bent` the places where the surface bends.
+    /// their distances, and `bent` the positions where the surface bends.
     fn faces(&self, mut planes: Vec<(Plane, f32)>, bent: &[Vec3], position: Vec3) -> Vec<Plane> {
         planes.retain(|(plane, _)| self.are_on(plane));
         let mut faces = Vec::new();
@@ -315,7 +318,7 @@ impl Witnesses {
             };
             let (same, others): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_same);
             let face = Plane::mean(&same, position);
-            let n_bent = bent.iter().filter(|place| self.is_on(&face, **place)).count();
+            let n_bent = bent.iter().filter(|position| self.is_on(&face, **position)).count();
             if n_bent <= MAX_BENT * same.len() {
                 faces.push(face);
             }

@@ -6,7 +6,7 @@
 use super::depth_steps::DepthSteps;
 use crate::error::Result;
 use crate::math::{Vec3, median, quantile};
-use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -281,7 +281,7 @@ fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 
     let Some(steps) = steps else { return 0.0 };
     let position = tree.positions()[point as usize];
     let reach = reach_at(tree, point);
-    let spacing = (std::f32::consts::PI / MIN_NOISE_NEIGHBORS as f32).sqrt() * reach;
+    let spacing = spacing_per_reach(MIN_NOISE_NEIGHBORS as f32) * reach;
     NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
 }
 

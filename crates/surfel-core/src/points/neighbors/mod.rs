@@ -19,6 +19,7 @@ use std::str::FromStr;
 
 pub use brute_force::nearest_by_brute_force;
 pub use kd_tree::KdTree;
+pub(crate) use neighbor::spacing_per_reach;
 pub use neighbor::{Neighbor, Neighborhood};
 
 /// The method that finds neighbours. The result does not depend on it.

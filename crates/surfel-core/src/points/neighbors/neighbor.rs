@@ -21,6 +21,11 @@ pub enum Neighborhood {
     Within(f32),
 }
 
+/// Returns the ratio of the spacing of points on a surface to the distance within which each has so many neighbours.
+pub(crate) fn spacing_per_reach(n_neighbors: f32) -> f32 {
+    (std::f32::consts::PI / n_neighbors).sqrt()
+}
+
 /// Computes a squared distance in the one order of operations that all methods share, so that they agree to the bit.
 pub(super) fn distance_squared(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;

@@ -104,20 +104,20 @@ fn choose_orientation(cloud: &PointCloud, normals: &[Vec3]) -> Orientation {
         Orientation::Station
     } else if SightLines::new(cloud).is_some() {
         Orientation::ScanAngle
-    } else if is_terrain(&cloud.positions) && are_mostly_steep(cloud, normals) {
+    } else if is_terrain(&cloud.positions) && is_mostly_level(cloud, normals) {
         Orientation::Up
     } else {
         Orientation::SpanningTree
     }
 }
 
-/// Returns true if most surfaces are seen from above: those of terrestrial scans are mostly walls and trunks.
-fn are_mostly_steep(cloud: &PointCloud, normals: &[Vec3]) -> bool {
-    const MIN_STEEPNESS: f32 = 0.5;
-    const MIN_FRACTION: usize = 2;
+/// Returns true if more than half of the normals are within 60 degrees of the vertical. Terrestrial scans are mostly
+/// walls and trunks.
+fn is_mostly_level(cloud: &PointCloud, normals: &[Vec3]) -> bool {
+    const MIN_VERTICAL_COSINE: f32 = 0.5;
     let valid = cloud.positions.par_iter().zip(normals).filter(|(p, _)| is_valid_position(**p));
-    let n_steep = valid.clone().filter(|(_, normal)| MIN_STEEPNESS < normal.z.abs()).count();
-    valid.count() < MIN_FRACTION * n_steep
+    let n_level = valid.clone().filter(|(_, n)| MIN_VERTICAL_COSINE < n.z.abs()).count();
+    valid.count() < 2 * n_level
 }
 
 fn flip_if(mut normals: Vec<Vec3>, is_backward: impl Fn(usize, Vec3) -> bool + Sync) -> Vec<Vec3> {

@@ -96,7 +96,7 @@ pub(super) fn canonical_sign(normal: Vec3) -> Vec3 {
 ///
 /// Returns [`Error::TooManyPoints`](crate::Error::TooManyPoints) beyond 32-bit indices and
 /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
-pub fn fill_missing(
+pub(crate) fn fill_missing(
     positions: &[Vec3],
     normals: &mut [Vec3],
     progress: &dyn Progress,

@@ -3,10 +3,9 @@
 
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::neighbors::{KdTree, Neighbor, Neighborhood};
+use crate::points::neighbors::{KdTree, Neighbor, Neighborhood, spacing_per_reach};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::f32::consts::PI;
 
 /// Number of neighbours of a sphere.
 const N_NEIGHBORS: usize = 16;
@@ -32,7 +31,7 @@ pub fn radii_by_curvature(
     let tree = KdTree::new(positions, progress)?;
     let curvatures = tree.map(Neighborhood::Nearest(N_NEIGHBORS), progress, curvature)?;
     let fitted = |(radius, curvature): (&f32, &f32)| {
-        let spacing = radius * (PI / k as f32).sqrt();
+        let spacing = radius * spacing_per_reach(k as f32);
         // A disc of radius r touches a sphere of curvature c, whose surface is c r^2 / 2 below its rim.
         let most = (2.0 * MAX_HEIGHT * spacing / curvature).sqrt();
         most.clamp(MIN_FACTOR * radius, *radius)

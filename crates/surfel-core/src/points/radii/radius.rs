@@ -14,6 +14,14 @@ const MAX_OUTLIER_RATIO: f32 = 4.0;
 /// Number of points from which one radius for all points is estimated, unless another one is asked for.
 pub const DEFAULT_RADIUS_SAMPLES: usize = 100;
 
+/// Number of points in a neighbourhood of `Radius::Median`, unless another one is asked for: a point of a surface has
+/// about as many direct neighbours.
+const DEFAULT_MEDIAN_POINTS: usize = 6;
+
+/// Rank of the neighbour whose distance is the radius, unless another one is asked for: the last one whose distance
+/// `Radius::Median` takes. On a square lattice it is two spacings away, so that discs overlap.
+const DEFAULT_RANK: usize = 2 * DEFAULT_MEDIAN_POINTS;
+
 /// The choice of radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Radius {
@@ -41,7 +49,7 @@ pub enum Radius {
 
 impl Default for Radius {
     fn default() -> Self {
-        Self::Adaptive { k: 12 }
+        Self::Adaptive { k: DEFAULT_RANK }
     }
 }
 
@@ -66,7 +74,7 @@ pub struct RadiusReport {
 ///
 /// Returns [`Error::Setting`] for a radius out of range, [`Error::EmptyCloud`] if there are no points to sample,
 /// [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::Cancelled`] if `progress` is cancelled.
-pub fn estimate_radii(
+pub(crate) fn estimate_radii(
     positions: &[Vec3],
     radius: Radius,
     seed: u64,
@@ -102,7 +110,7 @@ impl Radius {
     ///
     /// # Errors
     ///
-    /// Returns [`Error::Setting`] for a value out of range, as [`estimate_radii`] does.
+    /// Returns [`Error::Setting`] for a value out of range, as [`prepare`](crate::points::prepare) does.
     pub fn check(self) -> Result<()> {
         let (good, found) = match self {
             Self::Fixed(radius) => (0.0 < radius && radius < f32::INFINITY, radius.to_string()),
@@ -237,7 +245,7 @@ fn is_valid_radius(radius: f32) -> bool {
 
 /// A sample of distances between points.
 #[derive(Clone, Copy, Debug)]
-pub struct DistanceSample {
+pub(crate) struct DistanceSample {
     /// Number of nearest points of each sampled point.
     pub k: usize,
     /// Number of sampled points.
@@ -252,7 +260,7 @@ pub struct DistanceSample {
 /// # Errors
 ///
 /// Returns [`Error::EmptyCloud`] without points and [`Error::Cancelled`] if `progress` is cancelled.
-pub fn median_distance(
+pub(crate) fn median_distance(
     positions: &[Vec3],
     sample: &DistanceSample,
     progress: &dyn Progress,
@@ -305,8 +313,8 @@ impl FromStr for Radius {
         let count = |default| if number.is_empty() { Some(default) } else { number.parse().ok() };
         let radius = match name {
             "auto" if number.is_empty() => Some(Self::default()),
-            "adaptive" => count(12).map(|k| Self::Adaptive { k }),
-            "curvature" => count(12).map(|k| Self::Curvature { k }),
+            "adaptive" => count(DEFAULT_RANK).map(|k| Self::Adaptive { k }),
+            "curvature" => count(DEFAULT_RANK).map(|k| Self::Curvature { k }),
             "median" => parse_median(number),
             _ => text.parse().ok().map(Self::Fixed),
         };
@@ -325,7 +333,7 @@ fn parse_median(text: &str) -> Option<Radius> {
         Some((n, samples)) => (n, samples.parse().ok()?),
         None => (text, DEFAULT_RADIUS_SAMPLES),
     };
-    let n = if text.is_empty() { 6 } else { n.parse().ok()? };
+    let n = if text.is_empty() { DEFAULT_MEDIAN_POINTS } else { n.parse().ok()? };
     Some(Radius::Median { n, samples })
 }
 

@@ -140,7 +140,7 @@ fn is_confirmed(i: usize, walls: &[Option<Wall>]) -> bool {
     wall.points.len() <= 2 * wall.points.iter().filter(is_parallel).count()
 }
 
-/// Returns for each place whether a roof lies above or beside it, at most a typical radius lower.
+/// Returns for each candidate whether a roof lies above or beside it, at most a typical radius lower.
 fn are_below_roofs(
     candidates: &[Vec3],
     positions: &[Vec3],

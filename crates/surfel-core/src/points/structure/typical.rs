@@ -14,12 +14,12 @@ pub struct Typical {
     pub variation: f32,
     /// First quartile of the surface variations: that of the even parts, which noise causes.
     pub low_variation: f32,
-    /// Median of the radii.
+    /// Median of the radii, which may be those of other neighbourhoods than the planes have.
     pub radius: f32,
 }
 
 impl Typical {
-    /// Returns those of the planes through the neighbours of each point, and of the radii of these neighbourhoods.
+    /// Returns the typical properties of the planes through the neighbours of each point, and of the points' radii.
     pub fn of(fits: &[PlaneFit], radii: &[f32]) -> Self {
         let variations: Vec<f32> = fits.iter().map(|fit| fit.variation).collect();
         Self {
@@ -29,8 +29,8 @@ impl Typical {
         }
     }
 
-    /// Noise in radii of the neighbourhoods. The points of a round, even neighbourhood of radius 1 have a variance of 1/4
-    /// along each axis, so that noise is the root of half the variation.
+    /// Noise in radii of the planes' neighbourhoods. The points of a round, even neighbourhood of radius 1 have a
+    /// variance of 1/4 along each axis, so that noise is the root of half the variation.
     pub fn noise(&self) -> f32 {
         (0.5 * self.low_variation).sqrt()
     }

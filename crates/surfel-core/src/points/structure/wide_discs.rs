@@ -42,8 +42,9 @@ const MIN_RATIO: f32 = 2.0;
 const MAX_STRIP_WIDTH: f32 = 0.12;
 /// Minimum ratio of the radius of a disc to that of its nearest neighbours for more than one round.
 const MIN_WIDENING: f32 = 2.0;
-/// A fraction of one to this number of the neighbours may be dense points of a surface in the same plane.
-const MAX_DENSE: usize = 4;
+/// Maximum fraction of the neighbours that may be dense points in the disc's plane: with more, the disc is part of a
+/// surface, not of a strip.
+const MAX_DENSE_FRACTION: f32 = 0.25;
 /// Number of rounds that tell a surface from a strip.
 const MIN_STRIP_ROUNDS: usize = 3;
 /// Width of the neighbours of such a round from which those of further rounds form no strip either.
@@ -217,7 +218,8 @@ fn is_strip(
             wide.of_point(**neighbor).is_none()
                 && MIN_COSINE < shapes[**neighbor as usize].normal.dot(normal).abs()
         };
-        if last.len() < MAX_DENSE * last.iter().filter(is_dense_surface).count() {
+        let n_dense = last.iter().filter(is_dense_surface).count();
+        if MAX_DENSE_FRACTION * (last.len() as f32) < n_dense as f32 {
             return false;
         }
         let discs = last.iter().filter_map(|neighbor| wide.of_point(*neighbor));

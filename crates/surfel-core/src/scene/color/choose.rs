@@ -18,7 +18,7 @@ pub fn choose_source(cloud: &PointCloud) -> (ColorSource, String) {
         Some(_) => return (ColorSource::Rgb, "the colours of the file".into()),
         None => "no colours in the file",
     };
-    if is_terrain(cloud) {
+    if is_georeferenced_land(cloud) {
         return (ColorSource::Elevation, format!("{colors}; wide, flat and georeferenced"));
     }
     let constant = ColorSource::Constant(DEFAULT_COLOR);
@@ -43,7 +43,7 @@ fn are_white(colors: &[[u16; 3]]) -> bool {
 
 /// True if the cloud is a georeferenced piece of land, whose forms elevation shows better than intensity does: a good
 /// deal wider than it is high, and with coordinates far from zero.
-fn is_terrain(cloud: &PointCloud) -> bool {
+fn is_georeferenced_land(cloud: &PointCloud) -> bool {
     /// Coordinates of maps are larger; those of scanners and objects are not.
     const MIN_MAP_COORDINATE: f64 = 10_000.0;
     const MIN_WIDTH_PER_HEIGHT: f32 = 2.5;

@@ -3,7 +3,6 @@
 use super::choose::choose_source;
 use super::source::ColorSource;
 use super::support::{DEFAULT_RANGE, SupportColors};
-use crate::error::Result;
 use crate::image::{Colormap, PercentileRange};
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -33,16 +32,11 @@ impl Default for Coloring {
 
 impl Coloring {
     /// Returns the colours of hits by their support, if these are the source.
-    ///
-    /// # Errors
-    ///
-    /// Fails if the default colour map is unknown, which does not happen.
-    pub fn support_colors(&self) -> Result<Option<SupportColors>> {
-        let Some(source @ ColorSource::Support) = &self.source else { return Ok(None) };
-        let default = || Colormap::from_name(source.default_colormap());
-        let colormap = self.colormap.map_or_else(default, Ok)?;
+    pub fn support_colors(&self) -> Option<SupportColors> {
+        let source = self.source.as_ref().filter(|source| **source == ColorSource::Support)?;
+        let colormap = self.colormap.unwrap_or(source.default_colormap());
         let given = self.range.map(|(low, high)| PercentileRange { low, high });
-        Ok(Some(SupportColors { colormap, range: given.unwrap_or(DEFAULT_RANGE) }))
+        Some(SupportColors { colormap, range: given.unwrap_or(DEFAULT_RANGE) })
     }
 
     /// Returns the source for `cloud`, and the reason if it was chosen automatically.

@@ -45,10 +45,7 @@ impl<'c> Mapping<'c> {
             }
             None => automatic_range(cloud.len(), &value_at),
         };
-        let map = match coloring.colormap {
-            Some(map) => map,
-            None => Colormap::from_name(source.default_colormap())?,
-        };
+        let map = coloring.colormap.unwrap_or(source.default_colormap());
         let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
         let map_range = if is_gray { INTENSITY_GRAY_RANGE } else { (0.0, 1.0) };
         let gamma = match coloring.gamma {
@@ -95,9 +92,9 @@ fn format_range(PercentileRange { low, high }: PercentileRange) -> String {
 }
 
 impl ColorSource {
-    /// Returns the name of the map that is used if none is named.
-    pub(super) fn default_colormap(&self) -> &'static str {
-        if *self == Self::Intensity { "gray" } else { "viridis" }
+    /// Returns the map that is used if none is named.
+    pub(super) fn default_colormap(&self) -> Colormap {
+        if *self == Self::Intensity { Colormap::GRAY } else { Colormap::VIRIDIS }
     }
 
     /// Returns the value of each point, or `None` if the source has no values or `cloud` lacks its column.

@@ -6,8 +6,10 @@ use crate::math::{
     Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, SimdTask, Vec3, Vec3Lanes, rounded_normal,
     set_bits,
 };
-use crate::surface::mls::{self, PlaneLanes, PlaneSums, PolynomialSums, StepLanes, weight};
-use crate::surface::{CandidateHitLanes, EdgeTest, EdgeTestResult, NeighborhoodStats};
+use crate::surface::mls::{self, PlaneLanes, PlaneSums, PolynomialSums, StepLanes};
+use crate::surface::{
+    CandidateHitLanes, EdgeTest, EdgeTestResult, NeighborhoodStats, support_weight,
+};
 use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
 use crate::trace::query::hit::NearestHits;
@@ -208,7 +210,7 @@ fn fit_planes<W: PacketLanes>(
     let mut sums = PlaneSums::default();
     for row in lists.rows() {
         let offset = row.offset().minus(shift);
-        sums.add(offset, weight(offset, row.inverse_support()));
+        sums.add(offset, support_weight(offset.dot(offset), row.inverse_support_squared()));
     }
     sums.planes(direction)
 }
@@ -226,7 +228,7 @@ fn fit_polynomials<W: PacketLanes, const N: usize>(
     let mut sums = PolynomialSums::<W, N>::new(normals, mls::SUPPORT_FACTOR);
     for row in lists.rows() {
         let offset = row.offset().minus(shift);
-        sums.add(offset, weight(offset, row.inverse_support()));
+        sums.add(offset, support_weight(offset.dot(offset), row.inverse_support_squared()));
     }
     (sums.intersect(direction), sums.has_points())
 }
@@ -293,7 +295,7 @@ fn find_colors<W: PacketLanes>(
         if !cloud.blends_colors {
             continue;
         }
-        let own = weight(offset, row.inverse_support());
+        let own = support_weight(offset.dot(offset), row.inverse_support_squared());
         let own = own * own * own;
         let counts = (mask & W::splat(MIN_COLOR_WEIGHT).lt(own)).bits();
         let own = own.store();

@@ -3,7 +3,7 @@
 
 use crate::flat::{FieldLeaf, FlatCloud};
 use crate::math::{LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Vec3, Vec3Lanes, set_bits};
-use crate::surface::{FIELD_SUPPORT, FieldSums, field_weight};
+use crate::surface::{FIELD_SUPPORT, FieldSums, support_weight};
 use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::lane_mask;
 use crate::trace::query::ray_field::{
@@ -208,7 +208,7 @@ impl<W: PacketLanes> PacketField<W> {
         for point in &self.points {
             let distance = point.squared - t * (point.twice_along - t);
             let inverse = W::splat(point.point.inverse_support_squared);
-            sums.add(field_weight(distance, inverse), point.height + t * point.slope);
+            sums.add(support_weight(distance, inverse), point.height + t * point.slope);
         }
         sums.value()
     }

@@ -15,7 +15,7 @@ const MISSING_POINT_OFFSET: f32 = 1e3;
 #[derive(Clone, Copy)]
 pub struct PointRow {
     offset: [[f32; PACKET_WIDTH]; 3],
-    inverse_support: [f32; PACKET_WIDTH],
+    inverse_support_squared: [f32; PACKET_WIDTH],
     /// Slots as the bits of floats.
     pub slot: [f32; PACKET_WIDTH],
 }
@@ -23,7 +23,7 @@ pub struct PointRow {
 impl PointRow {
     const NONE: Self = Self {
         offset: [[MISSING_POINT_OFFSET; PACKET_WIDTH]; 3],
-        inverse_support: [1.0; PACKET_WIDTH],
+        inverse_support_squared: [1.0; PACKET_WIDTH],
         slot: [0.0; PACKET_WIDTH],
     };
 
@@ -35,8 +35,8 @@ impl PointRow {
 
     /// Returns the reciprocals of the squared radii of the points' weight functions, in radii of the positions.
     #[inline(always)]
-    pub fn inverse_support<W: PacketLanes>(&self) -> W {
-        W::load(&self.inverse_support)
+    pub fn inverse_support_squared<W: PacketLanes>(&self) -> W {
+        W::load(&self.inverse_support_squared)
     }
 }
 
@@ -125,11 +125,11 @@ impl PointLists {
                 let row = &mut self.rows[n_listed];
                 n_listed += usize::from(near.bits() != 0);
                 row.offset = Vec3Lanes::select(near, offset, row.offset()).store_packet();
-                let (inverse_support, slots) =
-                    (row.inverse_support(), L::PacketLanes::load(&row.slot));
-                let inverse_support =
-                    L::PacketLanes::select(near, inverse * inverse, inverse_support);
-                row.inverse_support = inverse_support.store();
+                let (inverse_support_squared, slots) =
+                    (row.inverse_support_squared(), L::PacketLanes::load(&row.slot));
+                let inverse_support_squared =
+                    L::PacketLanes::select(near, inverse * inverse, inverse_support_squared);
+                row.inverse_support_squared = inverse_support_squared.store();
                 row.slot = L::PacketLanes::select(near, slot, slots).store();
             }
         }

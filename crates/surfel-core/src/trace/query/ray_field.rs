@@ -2,7 +2,7 @@
 
 use crate::flat::{FieldLeaf, FlatCloud, FlatPoints};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, set_bits};
-use crate::surface::{FIELD_SUPPORT, FieldSums, PointLanes, field_weight};
+use crate::surface::{FIELD_SUPPORT, FieldSums, PointLanes, support_weight};
 use crate::trace::counts::{Counted, count};
 use crate::trace::query::hit::{Hit, NearestHits};
 use crate::trace::query::smooth_query::unit;
@@ -218,7 +218,7 @@ impl RayField {
         let inverse = &self.inverse_support_squared[..n];
         for i in 0..n {
             let distance = L::splat(squared[i]) - t * (L::splat(twice_along[i]) - t);
-            let weight = field_weight(distance, L::splat(inverse[i]));
+            let weight = support_weight(distance, L::splat(inverse[i]));
             sums.add(weight, L::splat(height[i]) + t * L::splat(slope[i]));
         }
         let (values, is_valid) = sums.value();
@@ -321,7 +321,7 @@ impl<F: Floats> ShadingSums<F> {
         let corner = Vec3Lanes::splat(point.corner).minus(*position);
         let center = corner.plus(Vec3Lanes::splat(point.offset));
         let squared = center.dot(center);
-        let weight = field_weight(squared, F::splat(point.inverse_support_squared));
+        let weight = support_weight(squared, F::splat(point.inverse_support_squared));
         let weight = F::select(near, weight, F::splat(0.0));
         self.normal = self.normal.plus(Vec3Lanes::splat(point.normal).scaled(weight));
         self.nearest.merge(near, squared, F::splat(f32::from_bits(point.slot)));

@@ -11,7 +11,7 @@ use crate::trace::query::edge_test::{evaluate_one, is_enclosed};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::smooth_query::{
     FindSurface, MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, StoredBlock, TOLERANCE, damped,
-    inverse_support, unit,
+    inverse_support_squared, unit,
 };
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
@@ -153,7 +153,7 @@ fn fit_points<L: Lanes>(
     let point = FitPoint {
         offset: points.center,
         normal: unit(points.normal),
-        inverse_support: inverse_support(points.radius),
+        inverse_support_squared: inverse_support_squared(points.radius),
     };
     (point, L::splat(0.0).lt(points.radius))
 }

@@ -2,7 +2,7 @@
 
 use crate::flat::FlatCloud;
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{CandidateHit, EdgeTest, EdgeTestResult, Surfel};
+use crate::surface::{CandidateHit, EdgeTest, EdgeTestResult, MIN_SLIT_DEPTH, Surfel};
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::hit::Hit;
@@ -13,9 +13,6 @@ use crate::trace::simd::packet_rays::PacketRays;
 
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
 pub const SMOOTH_RESTART_OFFSET: f32 = 0.002;
-/// Minimum distance between a disc and what a ray hits behind it, in radii of the disc, at which the ray has come through
-/// a slit. Nearer back faces are those of thin sheets.
-pub const MIN_SLIT_DEPTH: f32 = 3.0;
 /// Minimum cosine between a ray through a slit and the normal of the disc there. Beside a silhouette rays pass discs more
 /// from their side: without this limit six times as much background was covered around the head.
 pub const MIN_SLIT_COSINE: f32 = 0.5;

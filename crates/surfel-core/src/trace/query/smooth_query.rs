@@ -238,7 +238,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
                 }
                 let slot = L::PacketLanes::splat(f32::from_bits(slot));
                 // A wide disc's neighbours reach less far than it does.
-                let distance = point.offset.dot(point.offset) * point.inverse_support;
+                let distance = point.offset.dot(point.offset) * point.inverse_support_squared;
                 nearest.merge(is_near, distance, slot);
             }
         }
@@ -319,7 +319,7 @@ pub struct StoredBlock {
     /// Normals with integer components.
     normals: [[f32; LANES]; 3],
     unit_normals: [[f32; LANES]; 3],
-    inverse_supports: [f32; LANES],
+    inverse_supports_squared: [f32; LANES],
 }
 
 impl StoredBlock {
@@ -333,7 +333,7 @@ impl StoredBlock {
             offsets: block.offsets::<L>().store(),
             normals: normals.store(),
             unit_normals: unit(normals).store(),
-            inverse_supports: inverse_support(block.radii::<L>()).store(),
+            inverse_supports_squared: inverse_support_squared(block.radii::<L>()).store(),
         }
     }
 
@@ -347,7 +347,7 @@ impl StoredBlock {
         FitPoint {
             offset: corner.plus(Vec3Lanes::splat_lane(&self.offsets, lane)),
             normal: Vec3Lanes::splat_lane(&self.unit_normals, lane),
-            inverse_support: F::splat(self.inverse_supports[lane]),
+            inverse_support_squared: F::splat(self.inverse_supports_squared[lane]),
         }
     }
 }
@@ -360,7 +360,7 @@ pub(super) fn unit<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
 }
 
 #[inline(always)]
-pub(super) fn inverse_support<F: Floats>(radius: F) -> F {
+pub(super) fn inverse_support_squared<F: Floats>(radius: F) -> F {
     let support = F::splat(SUPPORT_FACTOR) * radius;
     F::splat(1.0) / (support * support)
 }

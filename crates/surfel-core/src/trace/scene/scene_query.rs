@@ -52,7 +52,8 @@ pub fn scene_hits_at(
     while let Some(batches) = scheduler.next(&distances) {
         for (instance_idx, ranges) in batches.iter().filter(|(_, ranges)| !ranges.is_empty()) {
             let instance = InstanceRef::new(scene, *instance_idx);
-            // Discs behind the nearest are blended with it, whatever other instances are between them.
+            // Discs behind the nearest are blended with it, and what is behind a slit closes it, whatever other instances
+            // are between them.
             let blend_distance = match instance.geometry {
                 FlatGeometry::Cloud(cloud) => cloud.max_blend_distance,
                 FlatGeometry::Mesh(_) => 0.0,

@@ -5,7 +5,7 @@ use crate::math::{Aabb, Lanes, Ray, Vec3A, clip_to_slab, finite_inverse_vec3};
 
 /// Allowance for rounding, relative to the largest coordinates involved: far more than f32 loses in a box or
 /// disc test, far less than a radius. No box is missed that contains a hit.
-const ROUNDING: f32 = 1e-6;
+pub const ROUNDING: f32 = 1e-6;
 
 /// Returns the length by which boxes are widened on all sides for a ray from `origin`.
 #[inline(always)]
