@@ -7,6 +7,7 @@ mod value;
 mod work;
 mod buffer;
 mod image;
+mod height_map;
 mod array;
 mod cloud;
 mod rays;
@@ -30,6 +31,8 @@ mod native {
 
     #[pymodule_export]
     use crate::cloud::{PyCloud, PyMesh};
+    #[pymodule_export]
+    use crate::height_map::PyHeightMap;
     #[pymodule_export]
     use crate::image::PyImage;
     #[pymodule_export]

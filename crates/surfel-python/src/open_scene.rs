@@ -99,7 +99,9 @@ pub fn opened(
 /// True if a scene that was read under one description can be shown under another. Files are checked and environment maps
 /// are read when a scene is opened, and threads are started.
 pub fn is_read_alike(startup: &SceneDescription, description: &SceneDescription) -> bool {
-    startup.light.environment == description.light.environment
+    let [was, is] = [startup, description].map(|it| &it.objects_default.preparation);
+    was.reads_like(is)
+        && startup.light.environment == description.light.environment
         && startup.camera.name == description.camera.name
         && startup.run == description.run
 }

@@ -3,6 +3,7 @@
 use crate::array::{checked, column};
 use crate::buffer::owned_array;
 use crate::errors::{invalid_setting, to_exception};
+use crate::height_map::PyHeightMap;
 use crate::image::PyImage;
 use crate::object::NewObject;
 use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
@@ -243,12 +244,7 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyImage> {
-        for key in ["output", "height_map"] {
-            if keys.is_some_and(|keys| keys.contains(key).unwrap_or(false)) {
-                let advice = "a file that the program writes; a picture of Python is saved by `image.save(path)`";
-                return Err(invalid_setting(py, Invalid::at(key, advice)));
-            }
-        }
+        refuse_outputs(py, keys)?;
         self.with_view(py, keys, progress, |scene, ChosenView { view, choices, .. }, progress| {
             let up = view.description.world.up.unwrap_or(Vec3::Z);
             let faults = faults(&view.description.picture, &view.flat.camera, up);
@@ -261,6 +257,24 @@ impl PyScene {
             let choices = choices.iter().map(line).collect();
             Ok(PyImage::new(image, view.flat.origin, point_ids, choices))
         })
+    }
+
+    /// Finds the elevations that a plan shows. Keywords are keys of scene files; they count for this map alone, as
+    /// `gsd=0.5`: one elevation every half metre.
+    ///
+    /// Raises `InvalidSetting` unless the camera looks straight down without perspective, and as `render`.
+    #[pyo3(signature = (*, progress = None, **keys))]
+    fn height_map(
+        &self,
+        py: Python<'_>,
+        progress: Option<&Bound<'_, PyAny>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyHeightMap> {
+        refuse_outputs(py, keys)?;
+        let map = self.with_view(py, keys, progress, |scene, chosen, progress| {
+            chosen.view.height_map(scene.simd(), progress)
+        })?;
+        Ok(PyHeightMap(Arc::new(map)))
     }
 
     /// Renders a region of a picture, columns and rows from the first to before the second: linear colour without overlay,
@@ -357,6 +371,26 @@ impl PyScene {
         let files = counted(description.files.len(), "file");
         format!("<surfel.Scene of {files} and {}>", counted(description.objects.len(), "object"))
     }
+}
+
+/// Refuses the keys of files that the program writes.
+fn refuse_outputs(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+    let outputs = [
+        (
+            "output",
+            "a file that the program writes; a picture of Python is saved by `image.save(path)`",
+        ),
+        (
+            "height_map",
+            "a file that the program writes; `scene.height_map(gsd=1).save(path)` does so",
+        ),
+    ];
+    for (key, advice) in outputs {
+        if keys.is_some_and(|keys| keys.contains(key).unwrap_or(false)) {
+            return Err(invalid_setting(py, Invalid::at(key, advice)));
+        }
+    }
+    Ok(())
 }
 
 /// Sets pixels that are NaN to the background.

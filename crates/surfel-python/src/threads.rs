@@ -2,13 +2,10 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use surfel::Error;
-use surfel::description::{Backend, Invalid, RunSettings};
+use surfel::description::RunSettings;
 
 /// Starts the threads that settings ask for; none if those of all work will do.
 pub fn start_threads(settings: &RunSettings) -> surfel::Result<Option<ThreadPool>> {
-    if settings.chosen_backend() == Backend::Gpu {
-        return Err(Invalid::at("backend", "gpu is not in this build; use cpu").into());
-    }
     let Some(n_threads) = settings.threads else { return Ok(None) };
     let threads = ThreadPoolBuilder::new().num_threads(n_threads as usize).build();
     threads.map(Some).map_err(|error| {

@@ -71,5 +71,5 @@ def test_missing_packages_are_named(hill, tmp_path):
     for python in ("no-such-python", str(bare)):
         words = [hill, "-o", tmp_path / "turn.gif", *TURN, "--cluster", "tcp://127.0.0.1:1"]
         ended = animate(*words, SURFEL_PYTHON=python)
-        assert ended.returncode == 1 and "pip install surfel[dask]" in ended.stderr, ended.stderr
+        assert ended.returncode == 1 and "pip install './crates/surfel-python[dask]'" in ended.stderr, ended.stderr
         assert not (tmp_path / "turn.gif").exists()

@@ -20,8 +20,8 @@ import surfel
         ({"camera": {"position": [1, 2, float("inf")]}}, "found inf, expected a number"),
         ({"color": object()}, "color: found an object of type object"),
         ({"camera_position": (1, 2, 3), "camera_focal_point": (1, 2, 3)}, "focal point"),
-        ({"backend": "gpu"}, "backend: gpu is not in this build"),
-        ({"device": "0"}, "backend: gpu is not in this build"),
+        ({"backend": "cuda"}, "backend: found \"cuda\""),
+        ({"backend": "cpu", "device": "0"}, "device: names a GPU, and the backend is cpu"),
         ({"window_size": (640, 480)}, "window_size: unknown key; here it is `resolution`"),
     ],
 )

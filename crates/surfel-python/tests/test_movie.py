@@ -25,6 +25,13 @@ def test_frames_are_those_of_the_program(hill, tmp_path):
         assert (ours / name).read_bytes() == (theirs / name).read_bytes(), name
 
 
+def test_settings_by_name_hold_for_movies(hill):
+    by_name = surfel.load(hill, object_settings=["hill.xyz:color=#ff0000"], turntable=2, **SMALL)
+    of_all = surfel.load(hill, color="#ff0000", turntable=2, **SMALL)
+    frames = [surfel.Film(scene, frames=2).render(1) for scene in (by_name, of_all)]
+    assert (frames[0].color == frames[1].color).all() and frames[0].coverage.any()
+
+
 def test_clouds_of_arrays_turn(points, tmp_path):
     scene = surfel.Scene(**SMALL)
     scene.add(surfel.Cloud(points))

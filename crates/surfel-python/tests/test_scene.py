@@ -57,6 +57,28 @@ def test_a_file_with_settings_of_its_own_comes_after_what_is_added(hill):
     assert scene.cast_rays([down(0, 0), down(10, 0)])["geometry_ids"].tolist() == [1, 0]
 
 
+def test_filters_hold_for_all_files_of_a_sequence(tmp_path):
+    for i, z in enumerate([0, 1]):
+        numpy.savetxt(tmp_path / f"hill{i}.xyz", hill_points(offset=(0, 0, z)))
+    (tmp_path / "scene.toml").write_text('[[object]]\nfiles = ["hill0.xyz", "hill1.xyz"]\nfps = 1\n')
+    keys = {"filter": "x < 0", "camera_position": (0, -4, 5), "camera_focal_point": (0, 0, 0.5), "up": "+Z", **SMALL}
+    sequence = surfel.load(tmp_path / "scene.toml", **keys)
+    for i in range(2):
+        ours, alone = sequence.render(time=i), surfel.load(tmp_path / f"hill{i}.xyz", **keys).render()
+        assert (ours.depth == alone.depth).all() and (ours.point_ids == alone.point_ids).all(), i
+        shown = ours.position[numpy.isfinite(ours.depth)]
+        assert 0 < len(shown) and shown[:, 0].max() < 0.1, i
+
+
+def test_keys_that_count_while_files_are_read_hold_for_pictures(tmp_path):
+    corners = [f"v {x} {y} 0\n" for x in range(5) for y in range(5)]
+    (tmp_path / "mesh.obj").write_text("".join(corners) + "f 1 5 25 21\n")
+    scene = surfel.load(tmp_path / "mesh.obj", **SMALL)
+    points = surfel.load(tmp_path / "mesh.obj", vertices=True, **SMALL).render()
+    assert scene.render().point_ids.min() == 0 and (scene.render(vertices=True).color == points.color).all()
+    assert not (scene.render().color == points.color).all()
+
+
 def test_settings_by_name_hold_for_pictures(hill):
     red = surfel.load(hill, object_settings=["hill.xyz:color=#ff0000"]).render(**SMALL)
     assert (red.color == surfel.load(hill, color="#ff0000").render(**SMALL).color).all()

@@ -19,7 +19,20 @@ from surfel._errors import (
     MissingFile,
     OutOfMemory,
 )
-from surfel._native import Cloud, Film, Image, Mesh, Scene, Viewer, __version__, animate, load, prepare, view
+from surfel._native import (
+    Cloud,
+    Film,
+    HeightMap,
+    Image,
+    Mesh,
+    Scene,
+    Viewer,
+    __version__,
+    animate,
+    load,
+    prepare,
+    view,
+)
 from surfel._rays import create_rays_pinhole
 
 __all__ = [
@@ -27,6 +40,7 @@ __all__ = [
     "EncoderError",
     "Error",
     "Film",
+    "HeightMap",
     "Image",
     "InaccessibleFile",
     "InvalidArray",

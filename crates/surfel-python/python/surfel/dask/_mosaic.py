@@ -19,10 +19,10 @@ def render_mosaic(recipes, *, rim=None, format="png"):
     """One plan of survey tiles as `dask.delayed` bytes of a file: of each recipe the tile, with a rim of its neighbours.
 
     `recipes`: a `Recipe` for each tile, which differ in their files alone, with `gsd`; the plan looks straight down, and
-    its edges lie on multiples of `gsd`. `rim`: how far around a tile its neighbours are read, in the unit of the
-    coordinates; as far as shadows reach and the sky is darkened if it is left out, at most the size of a tile. What the
-    recipes leave open (exposure, range of colours, reach of the sky's shade) is chosen once for all, from points of each
-    tile. No machine reads more than a tile and its rim. `format="tif"` gives a GeoTIFF.
+    its edges lie on multiples of `gsd`. `rim`: how far around a tile the points of its neighbours are used, in the unit of
+    the coordinates; as far as shadows reach and the sky is darkened if it is left out, at most the size of a tile. What
+    the recipes leave open (exposure, range of colours, reach of the sky's shade) is chosen once for all, from points of
+    each tile. No machine reads more than a tile and the neighbours that its rim touches. `format="tif"` gives a GeoTIFF.
 
     Raises `InvalidSetting` for recipes that do not fit together.
     """
