@@ -16,6 +16,9 @@ use surfel_core::progress::Progress;
 /// Names the interpreter that has the package, if it is not `python3`. The package's own program sets it.
 const INTERPRETER: &str = "SURFEL_PYTHON";
 
+/// Installs the package from a checkout.
+const INSTALL: &str = "`pip install './crates/surfel-python[dask]'`";
+
 /// Time between two looks whether the work is cancelled.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -80,7 +83,7 @@ impl Python {
         let missing = |error: io::Error| {
             Error::Unfit(format!(
                 "--cluster needs the Python package, and {} does not run: {error}; install Python and \
-                 `pip install surfel[dask]`, or name the interpreter by {INTERPRETER}",
+                 {INSTALL}, or name the interpreter by {INTERPRETER}",
                 interpreter.display()
             ))
         };
@@ -121,7 +124,7 @@ impl Python {
         }
         let last = text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
         let is_missing = ["No module named", "ImportError"].iter().any(|word| last.contains(word));
-        let advice = if is_missing { "; install it by `pip install surfel[dask]`" } else { "" };
+        let advice = if is_missing { format!("; install it by {INSTALL}") } else { String::new() };
         Err(Error::Unfit(format!("--cluster: the Python package failed: {last}{advice}")))
     }
 }

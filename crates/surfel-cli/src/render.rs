@@ -117,8 +117,8 @@ pub fn render_to_file(
         let (width, height) = scene.description().picture.resolution();
         report.note(&format!("{}: {width}x{height} pixels", output.display()));
     }
-    if let (Some((path, map)), Some(georeference)) = (heights, scene.georeference()) {
-        surfel_formats::save_height_map(path, &map, georeference)?;
+    if let Some((path, map)) = heights {
+        surfel_formats::save_height_map(path, &map)?;
     }
     if let Some(path) = stats {
         seconds.total = start.elapsed().as_secs_f64();

@@ -106,14 +106,16 @@ impl PlannedMovie {
     ///
     /// Fails for missing and broken files, if nothing moves and no number of frames is given, and if cancelled.
     pub fn new(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
-        let mut options = movie_options(description);
-        let loaded = LoadedScene::read(description, KeepOptions::default(), progress)?;
-        options.n_frames = frame_count(description, loaded.duration_secs())?;
-        let auto = AutoSettings::choose(&loaded, description, progress)?;
+        let mut description = description.clone();
+        description.apply_object_settings()?;
+        let mut options = movie_options(&description);
+        let loaded = LoadedScene::read(&description, KeepOptions::default(), progress)?;
+        options.n_frames = frame_count(&description, loaded.duration_secs())?;
+        let auto = AutoSettings::choose(&loaded, &description, progress)?;
         let mut complete = auto.complete_description(&loaded);
         complete.output.frames = Some(options.n_frames);
         complete.output.fps = Some(options.fps);
-        Ok(Self { loaded, complete, description: description.clone(), auto, options })
+        Ok(Self { loaded, complete, description, auto, options })
     }
 
     /// Returns about how many bytes the scene takes once it is built.

@@ -73,7 +73,6 @@ mod renderer;
 mod built_scene;
 pub mod ray_query;
 mod raycast;
-mod height_map;
 pub mod animate;
 pub mod prepare;
 mod scene_keys;
@@ -82,6 +81,7 @@ mod added_objects;
 mod point_overlap;
 mod thread_pools;
 pub mod live_view;
+mod height_map;
 pub mod live_scene;
 pub mod live_film;
 

@@ -71,16 +71,15 @@ impl LiveView {
     pub fn finished_with(&self, mut image: Image, legend: Legend) -> RenderedImage {
         self.overlay_with(legend).draw(&mut image, &self.flat.camera);
         let mut options = image_options(&self.description, self.flat.origin);
-        options.georeference = self.georeference();
+        options.georeference = self.georeference().filter(|_| self.description.plan.is_to_scale());
         RenderedImage::new(image, options)
     }
 
-    /// Returns where the pixels of a plan to scale lie.
-    fn georeference(&self) -> Option<Georeference> {
+    /// Returns where the pixels of a picture lie, if the camera looks straight down without perspective.
+    pub fn georeference(&self) -> Option<Georeference> {
         let system = coordinate_system(&self.loaded, &self.description);
         let size = (self.settings.width, self.settings.height);
-        let georeference = georeference(&self.flat.camera, size, system.as_ref());
-        georeference.filter(|_| self.description.plan.is_to_scale())
+        georeference(&self.flat.camera, size, system.as_ref())
     }
 
     /// Returns for each instance the number of what it shows: 0 is all files without an object, if there are any; the

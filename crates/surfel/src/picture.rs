@@ -23,7 +23,8 @@ impl RenderedImage {
     }
 
     /// Writes the picture: for display as `.png`, `.jpg`, `.webp` or `.tif`, with all layers as `.exr`. The file is
-    /// replaced once it is complete. A plan to scale is a GeoTIFF, or gets a world file beside it.
+    /// replaced once it is complete. A plan to scale that looks straight down is a GeoTIFF as `.tif`, and gets a world
+    /// file beside it as `.png`, `.jpg` or `.webp`.
     ///
     /// # Errors
     ///

@@ -33,7 +33,10 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::{Resolution, Rule};
 use surfel::description::{Backend, ObjectSettings};
-use surfel::resolve::{MemoryEstimate, choose_camera, choose_up, prepare_cloud, short_position};
+use surfel::resolve::{
+    MemoryEstimate, PIXEL_WITH_LAYERS, choose_camera, choose_up, prepare_cloud, short_position,
+    state_known_sides,
+};
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{DAffine3, DVec3, Vec3};
 use surfel_core::points::PointCloud;
@@ -41,7 +44,7 @@ use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Geometry, Graph, Material, Mesh};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{Hit, Simd};
-use surfel_formats::{ColumnChoice, FileInfo, Loaded};
+use surfel_formats::{Column, ColumnChoice, FileInfo, Loaded};
 
 /// Options that a file with a camera excludes.
 const CAMERA_OPTIONS: [&str; 11] = [
@@ -93,7 +96,7 @@ impl Scope for Args {
         let unread = ["camera.name", "camera.lock", "camera.station", "camera.interior"];
         let is_of_camera = path.starts_with("camera.") && !unread.contains(&path);
         match heading {
-            "Preparation" => path != "animation_name",
+            "Preparation" => !["animation_name", "reproject"].contains(&path),
             "Surface" => !path.starts_with("clip"),
             _ => is_of_camera || path == "up",
         }
@@ -245,10 +248,11 @@ fn kinds(args: &Args, scene: &BenchScene, report: &Report) -> Result<Vec<Rays>, 
 fn estimate_memory(args: &Args, description: &SceneDescription) -> anyhow::Result<MemoryEstimate> {
     let info = surfel_formats::inspect(&args.cloud)?;
     // Two rays and what is found along them take a little more than a pixel with its layers.
-    let n_pixels = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
+    let n_rays = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
     let infos = [(args.cloud.as_path(), info)].into();
     let subsample = description.objects_default.preparation.subsample;
-    Ok(MemoryEstimate::from_files(&infos, subsample, n_pixels).with_surfaces_of(description))
+    let bytes = n_rays * PIXEL_WITH_LAYERS;
+    Ok(MemoryEstimate::from_files(&infos, subsample, bytes).with_surfaces_of(description))
 }
 
 fn load_unbuilt(
@@ -269,6 +273,7 @@ fn load_unbuilt(
         geometry.options = settings.surface.options();
         geometry.edge_test = settings.surface.edge_test();
         geometry.octree_depth = settings.surface.octree_depth();
+        state_known_sides(&mut geometry, &settings.preparation);
         anyhow::Ok(geometry)
     })?;
     let camera = match file {
@@ -291,7 +296,10 @@ fn load(
     settings: &ObjectSettings,
     report: &Report,
 ) -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
-    let columns = ColumnChoice::Only(settings.preparation.kept_columns());
+    let of_preparation = settings.columns_of_preparation().into_iter();
+    let of_preparation = of_preparation.map(|name| Column::Scalar(name.to_owned()));
+    let kept = settings.preparation.kept_columns().into_iter();
+    let columns = ColumnChoice::Only(kept.chain(of_preparation).collect());
     let options = settings.preparation.load_options(columns)?;
     let vertices = || -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
         let Loaded { cloud, info: source } = surfel_formats::load(&args.cloud, &options, report)?;

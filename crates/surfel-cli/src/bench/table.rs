@@ -27,7 +27,8 @@ fn footer(result: &Value) -> String {
     let (threads, simd) = (&result["threads"], result["simd"].as_str().unwrap_or_default());
     let traced = match result["backend"].as_str() {
         Some("gpu") => {
-            format!("device: {}; rates by the wall, without transfers", result["device"])
+            let device = result["device"].as_str().unwrap_or_default();
+            format!("device: {device}; rates by the wall, without transfers")
         }
         _ => format!(
             "threads: {threads}; simd: {simd}; rates by processor time / threads, the last by the wall"

@@ -11,7 +11,7 @@ use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
 use surfel::description::{
     Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OrthographicHeight,
-    OutputSettings, parse_table, write_table,
+    OutputSettings, READ_ONCE, parse_table, write_table,
 };
 use surfel::names::file_name;
 use surfel_web::{Error, Limits, SettingsMap};
@@ -19,11 +19,9 @@ use surfel_web::{Error, Limits, SettingsMap};
 /// Target of a material for everything, where a page names a target.
 const EVERYTHING: &str = "*";
 
-/// Keys of files that count while the files are read.
-const READ_ONCE: [&str; 5] = ["vertices", "columns", "salvage", "animation_name", "crop"];
-
-fn is_read_once(setting: &ObjectOverride) -> bool {
-    READ_ONCE.contains(&setting.key.as_str())
+/// True for the settings of a file that count while it is read, and for its crop, which may be a file.
+fn is_fixed(setting: &ObjectOverride) -> bool {
+    setting.key == "crop" || READ_ONCE.contains(&setting.key.as_str())
 }
 
 /// Returns the settings of a description that a page sees.
@@ -66,6 +64,10 @@ pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescriptio
     if page.light.environment.is_some() && page.get("environment") != startup.get("environment") {
         return Err(Error::invalid_value("environment", "a page cannot change this setting"));
     }
+    let is_new = |key: &&&str| page.get(key).is_some() && page.get(key) != startup.get(key);
+    if let Some(key) = READ_ONCE.iter().find(is_new) {
+        return Err(Error::invalid_value(*key, "a page cannot change this setting"));
+    }
     let crop = page.objects_default.preparation.crop.as_ref();
     if matches!(crop, Some(Crop::File(_))) && page.get("crop") != startup.get("crop") {
         return Err(Error::invalid_value("crop", "a page cannot name a file"));
@@ -79,7 +81,7 @@ pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescriptio
         choice.target.take_if(|target| target == EVERYTHING);
     }
     let is_known = |one: &ObjectOverride| startup.overrides.all().contains(one);
-    let is_new = |one: &&ObjectOverride| is_read_once(one) && !is_known(one);
+    let is_new = |one: &&ObjectOverride| is_fixed(one) && !is_known(one);
     if let Some(fault) = page.overrides.all().iter().find(is_new) {
         let text = format!("a page cannot change {} of a file", fault.key);
         return Err(Error::invalid_value("object_settings", text));
@@ -161,7 +163,7 @@ pub fn from_file(
     let own = own.flat_map(|object| ObjectOverride::all_of(object, &target(object)));
     let settings = description.overrides.all().iter().cloned().chain(own);
     // The files are read as at the start.
-    let settings = settings.filter(|one| !is_read_once(one)).collect();
+    let settings = settings.filter(|one| !is_fixed(one)).collect();
     rename_targets(&mut description, |target| rows.name_of(target).to_owned());
     if table.contains_key("object") {
         // Objects without a material or settings have none, whatever the page chose before.

@@ -436,6 +436,9 @@ fn a_cluster_needs_the_python_package() {
     let ended = command(&words).env("SURFEL_PYTHON", "no-such-python").output().unwrap();
     let text = stderr(&ended);
     assert_eq!(ended.status.code(), Some(1), "{text}");
-    assert!(text.contains("error: ") && text.contains("pip install surfel[dask]"), "{text}");
+    assert!(
+        text.contains("error: ") && text.contains("pip install './crates/surfel-python[dask]'"),
+        "{text}"
+    );
     assert_eq!(folder.names(), ["dome.ply"]);
 }

@@ -243,12 +243,15 @@ fn an_empty_closed_room_is_lit_from_the_camera_within() {
         .map(|[x, y, z]| format!("{x} {y} {z}\n"))
         .collect();
     let room = folder.write("room.xyz", points);
-    let lights = |position: &str| -> Value {
+    let lights = |position: &str, options: &[&str]| -> Value {
         let focal_point = "--camera-focal-point=5,3,1.2";
         let arguments = ["render", &room, "--dry-run", "--camera-position", position, focal_point];
+        let arguments = [&arguments[..], options].concat();
         let description: Value = serde_json::from_str(&succeed(&arguments)).unwrap();
         description["light"].clone()
     };
-    assert_eq!(lights("1,1,1.6"), json!(["headlight"]));
-    assert_eq!(lights("-9,-9,6"), json!(["sun", "sky"]));
+    assert_eq!(lights("1,1,1.6", &[]), json!(["headlight"]));
+    assert_eq!(lights("-9,-9,6", &[]), json!(["sun", "sky"]));
+    // A sun that is asked for shines.
+    assert_eq!(lights("1,1,1.6", &["--sun-azimuth", "90"]), json!(["sun", "sky"]));
 }

@@ -113,6 +113,26 @@ fn a_panorama_looks_north_from_its_position() {
 }
 
 #[test]
+fn a_camera_looks_from_its_position_in_its_direction() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let common = ["render", &cloud, "-o", &folder.path("no.png"), "--dry-run", "--up", "+Z"];
+    let direction = |options: &[&str]| {
+        let position = ["--camera-position", "10,20,30"];
+        let choices = succeed(&[&common[..], &position, options].concat());
+        let camera = serde_json::from_str::<Value>(&choices).unwrap()["camera"].take();
+        let ahead = |axis: usize| camera["focal_point"][axis].as_f64().unwrap();
+        let offset = [0, 1, 2].map(|axis| ahead(axis) - [10.0, 20.0, 30.0][axis]);
+        let length = offset.iter().map(|x| x * x).sum::<f64>().sqrt();
+        offset.map(|x| (1e4 * x / length).round() / 1e4)
+    };
+    assert_eq!(direction(&["--camera-direction", "0,3,4"]), [0.0, 0.6, 0.8]);
+    assert_eq!(direction(&["--camera-elevation-angle", "90"])[2], -1.0);
+    let [x, y, z] = direction(&["--camera-azimuth-angle", "90"]);
+    assert!(z == 0.0 && (x.hypot(y) - 1.0).abs() < 1e-3, "{x} {y} {z}");
+}
+
+#[test]
 fn a_picture_can_be_written_to_stdout() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));

@@ -232,7 +232,7 @@ fn the_memory_limit_counts_triangles_and_textures() {
         let options = ["-o", &picture, "--resolution", "32x24", "--memory-limit", limit];
         [&["render", file], &options[..]].concat().iter().map(|word| word.to_string()).collect()
     };
-    let words: Vec<String> = render(&mesh, "500K");
+    let words: Vec<String> = render(&mesh, "450K");
     let text = fail(&words.iter().map(String::as_str).collect::<Vec<_>>(), 1);
     assert!(text.contains("2399 triangles need") && !text.contains("--subsample"), "{text}");
     let textured = format!("mtllib m.mtl\n{corners}usemtl m\n{faces}");

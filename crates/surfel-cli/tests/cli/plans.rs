@@ -229,7 +229,7 @@ fn the_sun_of_a_date_stands_where_the_place_says() {
 fn a_plan_that_does_not_fit_into_memory_is_refused_before_the_work() {
     let folder = Folder::new();
     let cloud = folder.write("floor.csv", floor());
-    let plan = ["--gsd", "0.001", "--memory-limit", "500M"];
+    let plan = ["--gsd", "0.001", "--memory-limit", "400M"];
     let picture = folder.path("plan.png");
     let text = fail(&[&["render", &cloud, "-o", &picture], &plan[..]].concat(), 1);
     assert!(text.contains("--memory-limit"), "{text}");

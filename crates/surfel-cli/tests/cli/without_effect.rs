@@ -51,6 +51,7 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
     for (options, expected) in [
         (&["--columns", "x,y,z"][..], "no effect, since no file is text"),
         (&["--animation-name", "walk"], "no effect, since no file is glTF"),
+        (&["--noise-threshold", "0.01"], "no effect: noise is estimated after 8 camera rays"),
         (&["--surface", "points", "--material", "mirror"], "the surface points shows nothing of a"),
     ] {
         let found = render(&ply, options);

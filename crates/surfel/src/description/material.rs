@@ -24,7 +24,7 @@ settings! {
         roughness: f64, FRACTION, "FRACTION";
         /// Index of refraction: glass 1.5, water 1.33; 1 reflects nothing.
         ior: f64, IOR, "INDEX";
-        /// Fraction of the light inside that goes on through the surface.
+        /// Fraction of the light that enters the surface and passes through it.
         transmission: f64, FRACTION, "FRACTION";
         /// Colour of white light after the attenuation distance inside.
         attenuation_color: Vec3, Color, "COLOR";

@@ -43,7 +43,9 @@ pub use named_view::{NamedView, ViewSettings};
 pub use nearest::{misspelled, nearest, nearest_if_any, synonym, with_nearest};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
-pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
+pub use object_settings::{
+    ColorSettings, ObjectSettings, PreparationSettings, READ_ONCE, SurfaceSettings,
+};
 pub use option::{has_option, is_list, option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 pub use plan::PlanSettings;

@@ -25,6 +25,9 @@ use surfel_core::surface::{
 };
 use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 
+/// Keys of the preparation that count while files are read.
+pub const READ_ONCE: [&str; 5] = ["vertices", "columns", "salvage", "reproject", "animation_name"];
+
 settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
@@ -82,9 +85,11 @@ settings! {
         /// Keeps only these returns of each laser pulse: first, last or only (those of pulses that have one).
         returns: Returns, OneOf(RETURNS), "WHICH";
         /// Keeps only points in an area, in the coordinates of their file: bounds as ([0,10],[0,10]), a POLYGON as
-        /// well-known text, or a GeoJSON or WKT file of polygons. Other points take no memory.
+        /// well-known text, or a GeoJSON or WKT file of polygons. Other points take no memory, except in the viewer
+        /// and in scenes of Python.
         crop: Crop, CropRule, "AREA";
-        /// All but the first of points at exactly one position: drop or keep [default: drop, keep for surfel prepare].
+        /// Points at exactly the same position with about the same normal: drop all but the first, or keep them
+        /// [default: drop, keep for surfel prepare].
         duplicates: Duplicates, OneOf(DUPLICATES), "CHOICE";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
@@ -100,22 +105,23 @@ settings! {
         mixed_pixels: MixedPixels = MixedPixels::default(), OneOf(MIXED_PIXELS), "CHOICE";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
-        /// Number of neighbours whose plane gives the normal. Where they bend, a cubic through 24 of them or more
-        /// does, the more the noisier they are [default: 16].
+        /// Number of neighbours whose plane gives the normal. Where the surface bends, a cubic through 24 neighbours or
+        /// more is used instead; noisier points use more [default: 16].
         normals_k: u32, count(2, 10_000), "K";
         /// Estimates normals from all neighbours within this distance in world units.
         normals_radius: f64, POSITIVE, "LENGTH";
         /// Front side of the surface: station (toward the scanner of each scan, of E57, PTX and PCD files), scan-angle
-        /// (toward the scanner of an airborne survey), up, mst (outward), viewpoint:X,Y,Z, none, or auto: the first of
-        /// these four that the file tells enough for. Where front sides are known, the back of a surface does not show
-        /// through slits between the points [default: auto for surfel prepare and the colour normal, else station].
+        /// (toward the scanner of an airborne survey), up (+Z), mst (outward), viewpoint:X,Y,Z, none, or auto: the
+        /// first of station, scan-angle, up and mst that the file tells enough for. Where front sides are known, the
+        /// back of a surface does not show through slits between the points [default: auto for surfel prepare and the
+        /// colour normal, else station].
         orient: Orientation, parsed(orientation_text), "RULE";
         /// Radius of each point's surface: a length, adaptive[:K] (the distance to the K-th neighbour), curvature[:K]
         /// (less where the surface bends) or median[:N[,C]] (the median distance of C points, 100, to their 2N nearest)
         /// [default: that of the file, or adaptive:12].
         radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
-        /// (leaves) apart; surface and scatter take all points for one.
+        /// (leaves) apart; surface treats all points as surface, scatter all as scattered.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
         /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell.
         free_space: bool = Preparation::default().free_space, Flag, "BOOL";
@@ -371,6 +377,11 @@ impl PreparationSettings {
     /// Returns the values of the settings that say which points are kept.
     pub(crate) fn filter_values(&self) -> Value {
         ["filter", "class", "returns", "crop"].map(|key| self.get(key)).into_iter().collect()
+    }
+
+    /// Returns true if files are read alike under other settings.
+    pub fn reads_like(&self, other: &Self) -> bool {
+        READ_ONCE.iter().all(|key| self.get(key) == other.get(key))
     }
 
     /// Returns true if the settings say how normals are estimated.

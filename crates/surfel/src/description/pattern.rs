@@ -54,12 +54,14 @@ fn matches(name: &str, parts: &[&str]) -> bool {
     true
 }
 
-/// A sort key by which `frame_10` comes after `frame_9`: runs of digits count by their length first.
-fn natural_order(name: &str) -> Vec<(usize, String)> {
+/// A sort key by which `frame_10` comes after `frame_9` and `frame_009`: runs of digits count without their leading
+/// zeros, and by their length first. The text decides between equal numbers.
+fn natural_order(name: &str) -> (Vec<(usize, String)>, String) {
     let mut parts: Vec<(usize, String)> = Vec::new();
     for c in name.chars() {
         let is_digit = c.is_ascii_digit();
         match parts.last_mut() {
+            Some((1, part)) if is_digit && *part == "0" => *part = c.to_string(),
             Some((len, part)) if is_digit && 0 < *len => {
                 part.push(c);
                 *len += 1;
@@ -67,7 +69,7 @@ fn natural_order(name: &str) -> Vec<(usize, String)> {
             _ => parts.push((usize::from(is_digit), c.to_string())),
         }
     }
-    parts
+    (parts, name.to_owned())
 }
 
 #[cfg(test)]
@@ -81,6 +83,12 @@ mod tests {
         let mut names = ["f10.ply", "f9.ply", "f1.ply", "e2.ply"];
         names.sort_by_key(|name| natural_order(name));
         assert_eq!(names, ["e2.ply", "f1.ply", "f9.ply", "f10.ply"]);
+        let mut names = ["f10.ply", "f2.ply", "f009.ply", "f02.ply", "f0.ply", "f000.ply", "f.ply"];
+        names.sort_by_key(|name| natural_order(name));
+        assert_eq!(
+            names,
+            ["f.ply", "f0.ply", "f000.ply", "f02.ply", "f2.ply", "f009.ply", "f10.ply"]
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ settings! {
         /// Renders a plan whose pixels are this many world units wide (ground sample distance), as in 0.05. It looks
         /// straight down unless the camera has a direction, and shows the whole scene unless --resolution gives the size
         /// of a sheet about --camera-focal-point. Pixels lie on multiples of the width, so that sheets tile. A .tif is a
-        /// GeoTIFF; other pictures get a world file.
+        /// GeoTIFF; .png, .jpg and .webp get a world file.
         gsd: f64, POSITIVE, "LENGTH";
         /// Renders a plan to scale for a print with --dpi, as in 1:50, in the unit of the coordinate system or in metres.
         scale: f64, ScaleRule, "1:N";

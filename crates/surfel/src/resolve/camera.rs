@@ -212,7 +212,11 @@ pub fn choose_camera(
         return camera;
     }
     let fitted = fit_camera(cloud, &fit);
-    let focal_point = settings.focal_point.unwrap_or(fitted.focal_point);
+    let ahead = || {
+        let distance = fitted.position.distance(fitted.focal_point);
+        Some(settings.position? + distance * stated_direction(settings, cloud, up)?)
+    };
+    let focal_point = settings.focal_point.or_else(ahead).unwrap_or(fitted.focal_point);
     let shifted = fitted.position + (focal_point - fitted.focal_point);
     let position = settings.position.unwrap_or(shifted);
     // A given position or focal point may look elsewhere than the fitted camera did.
@@ -231,6 +235,30 @@ pub fn choose_camera(
         progress.choice(&line, &keys);
     }
     Camera { position, focal_point, view_up, projection }
+}
+
+/// Returns the unit direction of view that the settings state, by angles perhaps: an azimuth alone is level.
+pub(super) fn stated_direction(
+    settings: &CameraSettings,
+    points: &PointCloud,
+    up: Vec3,
+) -> Option<DVec3> {
+    let is_turned = settings.azimuth_angle.is_some() || settings.elevation_angle.is_some();
+    let turned = || is_turned.then(|| elevation_direction(settings, points, up));
+    settings.direction.or_else(turned)?.try_normalize()
+}
+
+/// The direction of an elevation: level unless the settings say otherwise.
+fn elevation_direction(settings: &CameraSettings, points: &PointCloud, up: Vec3) -> DVec3 {
+    let fit = CameraFit {
+        up,
+        is_orthographic: true,
+        azimuth_deg: settings.azimuth_angle(),
+        elevation_deg: settings.elevation_angle.or(Some(0.0)),
+        ..CameraFit::default()
+    };
+    let camera = fit_camera(points, &fit);
+    camera.focal_point - camera.position
 }
 
 /// The camera of settings that leave nothing open.

@@ -1,11 +1,13 @@
 //! Checks of files before they are read: that they are there, are of their kind, and fit into memory.
 
-use super::memory::{MemoryEstimate, n_points};
+use super::memory::{MemoryEstimate, PIXEL, PIXEL_WITH_LAYERS, n_points};
+use super::render_settings;
 use super::sequence::is_streamed;
 use crate::description::{Invalid, ObjectDescription, SceneDescription};
 use crate::error::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use surfel_core::render::Settings;
 use surfel_formats::FileInfo;
 
 /// Fails where a file is missing or not of its kind, and where all need more memory than they may take: before the
@@ -36,7 +38,7 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
         }
     }
     let subsample = description.objects_default.preparation.subsample;
-    MemoryEstimate::from_files(&infos, subsample, n_pixels(description))
+    MemoryEstimate::from_files(&infos, subsample, picture_bytes(description))
         .with_surfaces_of(description)
         .check(description.run.memory_limit)
 }
@@ -65,8 +67,9 @@ fn check_materials(description: &SceneDescription) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// Returns the number of pixels of a description's picture.
-pub fn n_pixels(description: &SceneDescription) -> u64 {
-    let (width, height) = description.picture.resolution();
-    u64::from(width) * u64::from(height)
+/// Returns the bytes of a description's picture.
+pub fn picture_bytes(description: &SceneDescription) -> u64 {
+    let Settings { width, height, with_aovs, .. } = render_settings(description);
+    let pixel = if with_aovs { PIXEL_WITH_LAYERS } else { PIXEL };
+    pixel * u64::from(width) * u64::from(height)
 }

@@ -268,14 +268,19 @@ pub fn apply_surface_and_color(
     geometry.surface = surface;
     geometry.options = settings.surface.options();
     geometry.blends_colors = blends_colors;
-    geometry.support_colors = coloring.support_colors()?;
+    geometry.support_colors = coloring.support_colors();
     geometry.edge_test = settings.surface.edge_test();
     geometry.octree_depth = settings.surface.octree_depth();
-    geometry.has_outward_normals = settings.preparation.orients_outward();
+    state_known_sides(&mut geometry, &settings.preparation);
+    Ok(geometry)
+}
+
+/// Tells a geometry whether the normals of its points tell the sides of the surface.
+pub fn state_known_sides(geometry: &mut CloudGeometry, settings: &PreparationSettings) {
     let has_stations = geometry.cloud().has_stations();
     let has_normals = geometry.cloud().normals.is_some();
-    geometry.has_front_sides = has_normals && settings.preparation.knows_front_sides(has_stations);
-    Ok(geometry)
+    geometry.has_outward_normals = settings.orients_outward();
+    geometry.has_front_sides = has_normals && settings.knows_front_sides(has_stations);
 }
 
 /// Returns the surface of a cloud: that of the settings, or what suits its columns.

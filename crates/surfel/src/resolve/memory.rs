@@ -22,7 +22,8 @@ pub struct MemoryEstimate {
     n_splats: u64,
     n_triangles: u64,
     n_texels: u64,
-    n_pixels: u64,
+    /// Bytes of the picture.
+    picture: u64,
     /// Bytes of a point's tree, block, index, and other structures of its surface.
     flat_point: u64,
 }
@@ -44,18 +45,21 @@ const FLAT_TRIANGLE: u64 = 42;
 
 const TEXEL: u64 = 4;
 
+/// Bytes of a pixel: its colour and coverage.
+pub const PIXEL: u64 = 16 + 4;
+
 /// Bytes of a pixel with all its layers.
-const PIXEL: u64 = 16 + 60;
+pub const PIXEL_WITH_LAYERS: u64 = 16 + 60;
 
 /// Bytes of an average line of text, where a file does not say how many there are.
 const LINE: u64 = 30;
 
 impl MemoryEstimate {
-    /// Estimates from the headers of files, without reading their points.
+    /// Estimates from the headers of files, without reading their points, beside the bytes of a picture.
     pub fn from_files(
         files: &BTreeMap<&Path, FileInfo>,
         subsample: Option<Subsample>,
-        n_pixels: u64,
+        picture: u64,
     ) -> Self {
         let clouds = files.iter().filter(|(_, info)| info.n_triangles.is_none());
         let clouds: Vec<(u64, bool)> =
@@ -72,16 +76,16 @@ impl MemoryEstimate {
             n_splats,
             n_triangles,
             n_texels: 0,
-            n_pixels,
+            picture,
             flat_point: FLAT_POINT,
         }
     }
 
-    /// Estimates from what was read, where textures are known too.
+    /// Estimates from what was read, where textures are known too, beside the bytes of a picture.
     pub fn from_graph(
         graph: &Graph<PointCloud>,
         subsample: Option<Subsample>,
-        n_pixels: u64,
+        picture: u64,
     ) -> Self {
         let (n_points, n_triangles) = graph.n_points_and_triangles();
         let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
@@ -92,7 +96,7 @@ impl MemoryEstimate {
             _ => None,
         });
         let (n_splats, flat_point) = (sum(clouds), FLAT_POINT);
-        Self { n_points, n_kept_points, n_splats, n_triangles, n_texels, n_pixels, flat_point }
+        Self { n_points, n_kept_points, n_splats, n_triangles, n_texels, picture, flat_point }
     }
 
     /// Adds the structures that the surfaces of a description take besides the points' tree.
@@ -119,7 +123,7 @@ impl MemoryEstimate {
         ]);
         // Vertices and textures stand in the flat form as they were read.
         let flat = sum([(trees / 2, 5), (meshes, 1)]);
-        [read, flat, sum([(self.n_pixels, PIXEL)])]
+        [read, flat, self.picture]
     }
 
     /// Returns the bytes of a scene that is kept: as read, as prepared, and in the flat form.
@@ -213,12 +217,12 @@ mod tests {
         n_splats: 0,
         n_triangles: 0,
         n_texels: 0,
-        n_pixels: 0,
+        picture: 0,
         flat_point: FLAT_POINT,
     };
 
-    fn advice(n_points: u64, n_kept_points: u64, n_pixels: u64, limit: u64) -> String {
-        let estimate = MemoryEstimate { n_points, n_kept_points, n_pixels, ..NOTHING };
+    fn advice(n_points: u64, n_kept_points: u64, picture: u64, limit: u64) -> String {
+        let estimate = MemoryEstimate { n_points, n_kept_points, picture, ..NOTHING };
         assert!(limit < estimate.total());
         estimate.advice(limit)
     }
@@ -226,15 +230,15 @@ mod tests {
     #[test]
     fn the_advice_fits_the_limit() {
         let (n_points, limit) = (1_000_000, 60_000_000);
-        let text = advice(n_points, n_points, 10_000, limit);
+        let text = advice(n_points, n_points, 760_000, limit);
         let n_kept_points = text.split(|c: char| !c.is_ascii_digit()).find(|word| !word.is_empty());
         let n_kept_points = n_kept_points.unwrap().parse().unwrap();
-        let estimate = MemoryEstimate { n_points, n_kept_points, n_pixels: 10_000, ..NOTHING };
+        let estimate = MemoryEstimate { n_points, n_kept_points, picture: 760_000, ..NOTHING };
         assert!(limit - 1000 < estimate.total() && estimate.total() <= limit, "{text}");
         // Fewer points do not reduce what is read.
-        assert_eq!(advice(n_points, n_points, 10_000, 30_000_000), "");
-        assert_eq!(advice(n_points, 16, 10_000, 30_000_000), "");
-        assert!(advice(64, 64, 250, 10_000).contains("--resolution"));
+        assert_eq!(advice(n_points, n_points, 760_000, 30_000_000), "");
+        assert_eq!(advice(n_points, 16, 760_000, 30_000_000), "");
+        assert!(advice(64, 64, 19_000, 10_000).contains("--resolution"));
     }
 
     #[test]

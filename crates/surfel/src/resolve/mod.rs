@@ -29,21 +29,22 @@ pub use check_files::check_files;
 pub(crate) use cloud::keep_matching;
 pub use cloud::{
     can_be_colored, check_empty, prepare_cloud, report_denoise, report_normals, report_prepared,
-    report_radii,
+    report_radii, state_known_sides,
 };
 pub(crate) use common_legend::common_legend;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub(crate) use loaded::report_unused_of_files;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
-pub use memory::{MemoryEstimate, n_points};
+pub use memory::{MemoryEstimate, PIXEL_WITH_LAYERS, n_points};
 pub use plan::coordinate_system;
+pub(crate) use plan::height_map_place;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
 pub use station::{LocatedStation, located_stations};
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
-use crate::crs::{CoordinateSystem, Unit};
+use crate::crs::{CoordinateSystem, Unit, georeference};
 use crate::description::{CameraSettings, LightKind, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use crate::overlay::{Overlay, faults};
@@ -52,7 +53,7 @@ use camera::SceneExtent;
 use complete_description::complete_description;
 use inside::{Inside, choose_inside};
 use interior::{choose_room, hidden_ceiling, hidden_walls};
-use plan::{check_height_map, frame_plan};
+use plan::frame_plan;
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::stand_at_station;
@@ -277,6 +278,7 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
         width,
         height,
         samples_per_pixel: picture.spp(),
+        noise_threshold: picture.noise_threshold() as f32,
         light_samples: picture.light_samples(),
         max_depth: picture.max_depth(),
         seed: picture.seed(),
@@ -285,15 +287,18 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
     }
 }
 
-/// Returns true if the picture is written with all layers, for other programs rather than to be looked at.
 /// Checks that the first camera allows the scale bar, the north arrow and the height map that are asked for.
 fn check_camera(description: &SceneDescription, camera: &Camera, up: Vec3) -> Result<()> {
     let faults =
         if is_exr(description) { Vec::new() } else { faults(&description.picture, camera, up) };
     faults.into_iter().next().map_or(Ok(()), Err)?;
-    Ok(check_height_map(description, camera)?)
+    if description.plan.height_map.is_some() {
+        height_map_place(description, georeference(camera, (1, 1), None))?;
+    }
+    Ok(())
 }
 
+/// Returns true if the picture is written with all layers, for other programs rather than to be looked at.
 fn is_exr(description: &SceneDescription) -> bool {
     let extension = description.output.output.as_ref().and_then(|path| path.extension());
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))

@@ -1,15 +1,17 @@
 //! Plans to scale: the camera and the size of the picture, so that pixels lie on round coordinates.
 
+use super::camera::stated_direction;
 use super::loaded::LoadedScene;
-use crate::crs::{CoordinateSystem, Unit, georeference};
+use crate::crs::{CoordinateSystem, Unit};
 use crate::description::{CameraSettings, Invalid, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, is_valid_position};
 use surfel_core::progress::Progress;
 use surfel_core::render::MAX_PIXELS;
-use surfel_core::scene::{Camera, CameraFit, Projection, default_view_up, fit_camera};
+use surfel_core::scene::{Camera, Projection, default_view_up};
 use surfel_core::surface::SurfaceKind;
+use surfel_formats::Georeference;
 
 /// Returns the coordinate system of a scene: that of the description, or the one that its files share.
 pub fn coordinate_system(
@@ -64,24 +66,21 @@ pub fn frame_plan(
     scene.check_memory(description)
 }
 
-/// Checks that a height map is asked of a camera that looks straight down.
-pub fn check_height_map(
+/// Returns where the pixels of a height map lie: where those of the picture do, if the scene has a surface and the camera
+/// looks straight down.
+pub(crate) fn height_map_place(
     description: &SceneDescription,
-    camera: &Camera,
-) -> std::result::Result<(), Invalid> {
-    if description.plan.height_map.is_none() {
-        return Ok(());
-    }
+    georeference: Option<Georeference>,
+) -> std::result::Result<Georeference, Invalid> {
     if description.objects_default.surface.surface() == SurfaceKind::Points {
         let advice = "needs a surface; leave out --surface points";
         return Err(Invalid::at("height_map", advice));
     }
-    if georeference(camera, (1, 1), None).is_none() {
+    georeference.ok_or_else(|| {
         let advice =
             "needs a camera that looks straight down without perspective: add --gsd LENGTH";
-        return Err(Invalid::at("height_map", advice));
-    }
-    Ok(())
+        Invalid::at("height_map", advice)
+    })
 }
 
 /// Writes a positive number with its first six digits.
@@ -101,9 +100,8 @@ fn plan_camera(
     up: Vec3,
 ) -> Camera {
     let towards = settings.position.zip(settings.focal_point).map(|(from, to)| to - from);
-    let is_turned = settings.azimuth_angle.is_some() || settings.elevation_angle.is_some();
-    let turned = || elevation_direction(settings, points, up);
-    let forward = settings.direction.or(towards).or_else(|| is_turned.then(turned));
+    let forward = settings.direction.or(towards);
+    let forward = forward.or_else(|| stated_direction(settings, points, up));
     let forward = forward.unwrap_or(-up.as_dvec3()).normalize();
     let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
     let focal_point = settings.focal_point.or(settings.position).unwrap_or(middle);
@@ -121,19 +119,6 @@ fn plan_camera(
     let focal_point =
         if forward.dot(focal_point - position) <= 0.0 { position + forward } else { focal_point };
     Camera { position, focal_point, view_up, projection: Projection::Orthographic { height: 1.0 } }
-}
-
-/// The direction of an elevation: level unless the settings say otherwise.
-fn elevation_direction(settings: &CameraSettings, points: &PointCloud, up: Vec3) -> DVec3 {
-    let fit = CameraFit {
-        up,
-        is_orthographic: true,
-        azimuth_deg: settings.azimuth_angle(),
-        elevation_deg: settings.elevation_angle.or(Some(0.0)),
-        ..CameraFit::default()
-    };
-    let camera = fit_camera(points, &fit);
-    camera.focal_point - camera.position
 }
 
 fn is_within(bounds: Aabb, point: Vec3) -> bool {

@@ -1,7 +1,8 @@
 //! Sequences of clouds and meshes, such as 4-D scans: each file is read when its time comes.
 
 use super::cloud::{
-    ImportOptions, apply_surface_and_color, graph_of, import, into_cloud, prepare_cloud,
+    ImportOptions, apply_surface_and_color, filter_cloud, graph_of, import, into_cloud,
+    prepare_cloud,
 };
 use super::unlit::unlit_without_lights;
 use crate::description::{ObjectDescription, ObjectSettings};
@@ -151,6 +152,7 @@ impl Sequence {
             }
         };
         let mut content = graph.try_map_clouds(|cloud: PointCloud| {
+            let cloud = self.without_dropped(cloud, progress)?;
             let prepared = prepare_cloud(cloud, &self.settings, self.options.seed, progress);
             let colored = prepared
                 .and_then(|cloud| apply_surface_and_color(cloud, &self.settings, up, progress));
@@ -166,6 +168,22 @@ impl Sequence {
         let name = file.file_stem().unwrap_or_default();
         content.nodes[0].name = name.to_string_lossy().into_owned();
         Ok(content)
+    }
+
+    /// Drops the points and columns that the settings do not keep, if all of the file was read.
+    fn without_dropped(
+        &self,
+        mut cloud: PointCloud,
+        progress: &dyn Progress,
+    ) -> Result<PointCloud> {
+        if !self.options.keeps_all_columns {
+            return Ok(cloud);
+        }
+        let settings = &self.settings.preparation;
+        cloud.source_indices = Some((0..cloud.len() as u32).collect());
+        let mut cloud = filter_cloud(cloud, settings, progress)?;
+        settings.drop_estimated(&mut cloud);
+        Ok(cloud)
     }
 
     /// Puts what a file holds in place of what was shown before.

@@ -7,7 +7,7 @@ use surfel_core::progress::Progress;
 /// Fraction of the picture below which its coverage is reported.
 const MIN_COVERAGE: f64 = 0.005;
 /// Minimum gap between two parts of a scene that is reported, in multiples of both parts' lengths together.
-const MAX_GAP_RATIO: f64 = 10.0;
+const MIN_GAP_RATIO: f64 = 10.0;
 /// Minimum number of points of a part: fewer are outliers.
 const MIN_POINTS: usize = 20;
 
@@ -53,7 +53,7 @@ fn largest_gap(mut values: Vec<f64>) -> Option<(f64, f64)> {
         .max_by(|a, b| (values[*a] - values[*a - 1]).total_cmp(&(values[*b] - values[*b - 1])))?;
     let gap = values[at] - values[at - 1];
     let (lower, upper) = (values[at - 1] - values[0], values[values.len() - 1] - values[at]);
-    (0.0 < gap && MAX_GAP_RATIO * (lower + upper) < gap).then_some((gap, lower.max(upper)))
+    (0.0 < gap && MIN_GAP_RATIO * (lower + upper) < gap).then_some((gap, lower.max(upper)))
 }
 
 #[cfg(test)]

@@ -66,7 +66,10 @@ pub fn stand_at_station(
     let Some(view) = found.and_then(|station| station.view(up)) else {
         let names: Vec<&str> = stations.iter().map(|station| station.name).collect();
         let known = match &names[..] {
-            [] => "no file states the place of a scanner, as E57 and PTX files do".to_owned(),
+            [] => {
+                "no file states the position of a scanner, as E57, PTX and organised PCD files do"
+                    .to_owned()
+            }
             names => format!("there is {}", names.join(", ")),
         };
         return Err(Invalid::at("camera.station", format!("no station `{name}`; {known}")));

@@ -64,13 +64,12 @@ pub fn choose_lights(
     let is_lit = is_lit(description, context.has_normals);
     let mut chosen = description.clone();
     let SceneDescription { light, sun, sky, .. } = &mut chosen;
-    if is_lit && context.is_inside && light.light.is_none() && light.environment.is_none() {
-        progress.choice("headlight: the camera stands in a closed room or tunnel", &["light"]);
-        light.light = Some(vec![LightKind::Headlight]);
-    }
     let is_sun_open =
         light.light.is_none() && light.environment.is_none() && *sun == SunSettings::default();
-    if is_lit && is_sun_open && is_sun_hidden(context) {
+    if is_lit && is_sun_open && context.is_inside {
+        progress.choice("headlight: the camera stands in a closed room or tunnel", &["light"]);
+        light.light = Some(vec![LightKind::Headlight]);
+    } else if is_lit && is_sun_open && is_sun_hidden(context) {
         progress.choice("headlight: hardly any sun would reach what the scanner saw", &["light"]);
         light.light = Some(vec![LightKind::Sky, LightKind::Headlight]);
     }

@@ -24,6 +24,10 @@ pub fn stand_sun_at_date(
     progress: &dyn Progress,
 ) -> Result<(), Invalid> {
     let Some(date) = description.sun.date.take() else { return Ok(()) };
+    if !description.light.has(LightKind::Sun) {
+        progress.choice("warning: no effect: the lights have no sun", &["sun", "light"]);
+        return Ok(());
+    }
     let system = coordinate_system(scene, description);
     let place = description.world.place.or_else(|| system.as_ref()?.place(position));
     let Some(place) = place else {

@@ -1,6 +1,6 @@
 //! Checks of a description against the content of its files: memory, surfaces and columns of colours.
 
-use super::super::check_files::n_pixels;
+use super::super::check_files::picture_bytes;
 use super::super::cloud::can_be_colored;
 use super::super::memory::MemoryEstimate;
 use super::LoadedScene;
@@ -17,7 +17,7 @@ impl LoadedScene {
     /// Fails if trees and picture need more memory than they may take.
     pub(in crate::resolve) fn check_memory(&self, description: &SceneDescription) -> Result<()> {
         let subsample = description.objects_default.preparation.subsample;
-        MemoryEstimate::from_graph(&self.graph, subsample, n_pixels(description))
+        MemoryEstimate::from_graph(&self.graph, subsample, picture_bytes(description))
             .with_surfaces_of(description)
             .check(description.run.memory_limit)
     }
