@@ -138,23 +138,11 @@ impl Field {
         out: &mut [T],
         set: impl Fn(&mut T, f64),
     ) {
-        match self.no_data.map(|number| number * self.scale + self.offset) {
-            Some(missing) => self.fill_numbers(records, stride, big_endian, out, |slot, v| {
-                set(slot, if v == missing { f64::NAN } else { v });
-            }),
-            None => self.fill_numbers(records, stride, big_endian, out, set),
-        }
-    }
-
-    /// Does the work of `fill`, without regard to missing values.
-    fn fill_numbers<T>(
-        &self,
-        records: &[u8],
-        stride: usize,
-        big_endian: bool,
-        out: &mut [T],
-        set: impl Fn(&mut T, f64),
-    ) {
+        // A value that is no number equals no other.
+        let missing = self.no_data.map_or(f64::NAN, |number| number * self.scale + self.offset);
+        let set = |slot: &mut T, value: f64| {
+            set(slot, if value == missing { f64::NAN } else { value });
+        };
         let records = records.chunks_exact(stride).zip(out);
         if let Some((lowest, n_bits)) = self.bits {
             let mask = ((1u16 << n_bits) - 1) as u8;

@@ -186,10 +186,9 @@ async fn a_page_saves_one_picture_after_the_other_and_leaves_room_for_other_page
     let mut busy = TestPage::open(&server, json!({ "slow_render": 100 })).await;
     busy.finished_picture().await;
     let save = |id: u32| json!({ "type": "save", "id": id, "width": 30, "height": 20 });
-    for id in [1, 2] {
-        busy.send_json(save(id)).await;
-    }
+    busy.send_json(save(1)).await;
     wait_until(|| server.provider.n_started.load(Ordering::Relaxed) == 1).await;
+    busy.send_json(save(2)).await;
     let mut other = TestPage::open(&server, json!({})).await;
     other.finished_picture().await;
     other.send_json(save(7)).await;
