@@ -163,7 +163,7 @@ check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 prepare_gdal
 prepare_vulkan
-tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
+tests "tests" cargo test --workspace --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
 # The page's tests use `import.meta.dirname`, which Node.js has since 20.11.
 if node -e 'const [a, b] = process.versions.node.split("."); process.exit(+a < 20 || (+a === 20 && +b < 11) ? 1 : 0)' 2>/dev/null; then

@@ -107,7 +107,7 @@ fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
     assert_eq!(folder.names(), ["dome.ply"]);
     assert!(render("cpu", "120x120", "2M").status.success());
     // Under this limit the queues are shorter than the picture.
-    assert!(render("gpu", "400x300", "20M").status.success());
+    assert!(render("gpu", "200x150", "11M").status.success());
 }
 
 #[test]

@@ -173,7 +173,8 @@ fn support_is_a_colour_source_with_a_map_and_a_range() {
         assert!(picture(&["--color", "support", "--surface", surface]) != support, "{surface}");
     }
     let file = folder.path("told.png");
-    let report = stderr(&surfel(&["render", &cloud, "-o", &file, "--color", "support"]));
+    let render = ["render", &cloud, "-o", &file, "--color", "support"];
+    let report = stderr(&surfel(&[&render[..], &SMALL].concat()));
     let expected = "color support from 0.000 to 1.000 (at a point to one radius away from all points), map \
                     viridis [--color, --cmap, --range, --gamma]";
     assert!(report.contains(expected), "{report}");

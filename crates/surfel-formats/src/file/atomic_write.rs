@@ -45,6 +45,13 @@ pub(crate) fn write_temp(path: &Path, write: impl FnOnce(&Path, File) -> Result<
     Ok(())
 }
 
+/// Checks that the folder of `path` takes new files.
+pub(crate) fn check_writable(path: &Path) -> Result<()> {
+    let (temp, _) = create_temp(path)?;
+    drop(TempGuard(temp));
+    Ok(())
+}
+
 /// Returns the error of a write to `path` that failed.
 pub(crate) fn write_error(path: &Path, cause: io::Error) -> Error {
     let file = path.display().to_string();

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use super::atomic_write::{parent_folder, write_error};
+use super::atomic_write::{check_writable, parent_folder, write_error};
 use crate::error::{Error, Result};
 
 /// Checks that a file of any format can be written to `path`.
 ///
 /// # Errors
 ///
-/// Fails if the folder of `path` does not exist, or if `path` is a folder itself or ends as the name of one.
+/// Fails if the folder of `path` does not exist or takes no new files, or if `path` is a folder itself or ends as the name
+/// of one.
 pub fn check_output_path(path: &Path) -> Result<()> {
     let folder = parent_folder(path);
     let ends_as_folder = path.to_string_lossy().ends_with(std::path::is_separator);
@@ -20,7 +21,7 @@ pub fn check_output_path(path: &Path) -> Result<()> {
     } else if !folder.is_dir() {
         std::io::ErrorKind::NotADirectory
     } else {
-        return Ok(());
+        return check_writable(path);
     };
     Err(write_error(path, problem.into()))
 }
