@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 use surfel_core::image::Image;
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, Preparation, select_points};
+use surfel_core::points::{Orientation, PointCloud, Preparation, select_points};
 use surfel_core::progress::NoProgress;
 use surfel_core::scanner::Instrument;
 use surfel_core::scanner::scenes::NamedScene;
@@ -126,11 +126,13 @@ fn compare_surfaces(
     let mut compared = Vec::new();
     for (surface, kind) in &selection.kinds {
         let begin = Instant::now();
-        let mut points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
+        // As the program has it: normals toward the stations.
+        let preparation =
+            Preparation { orientation: Orientation::Station, ..Preparation::default() };
+        let mut points = scenes::prepared(cloud.clone(), &preparation, *kind);
         points.has_front_sides = points.cloud().has_stations();
         report_secs(case.name, &format!("{surface} prepared"), begin);
         if selection.written_clouds.is_some() {
-            let preparation = Preparation::default();
             let (cloud, _) = select_points(cloud.clone(), &preparation, &NoProgress).unwrap();
             let cloud = with_normals(cloud, points.cloud(), scene, &*case.instrument);
             reconstruction::write_cloud(selection, case.name, &cloud);

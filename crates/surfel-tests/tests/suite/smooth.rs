@@ -159,6 +159,15 @@ fn rays_end_at_slits_where_front_sides_are_known() {
     sheet.has_front_sides = true;
     let closed = heights_at(&sheet, in_slit);
     assert!(closed.iter().all(|z| z.abs() < 0.01), "{closed:?}");
+    let aslant = Vec3::new(0.0, 1.8, -1.0);
+    let ray = |i: i32| {
+        let in_sheet = Vec3::new(in_slit, -0.9 + 0.0002 * i as f32, 0.0);
+        Ray::new(in_sheet - aslant, aslant)
+    };
+    let rays: Vec<Ray> = (-200..200).map(ray).collect();
+    let flat = FlatCloud::new(&sheet, &NoProgress).unwrap();
+    let closed = hits(&flat, &rays);
+    assert!(closed.iter().all(|hit| (hit.distance - 1.0).abs() < 0.01), "{closed:?}");
     let beyond = heights_at(&sheet, 20.2 * SLIT_SPACING + width);
     assert!(beyond.iter().all(|z| *z == f32::NEG_INFINITY), "{beyond:?}");
     // Nothing lies behind the slit of a single sheet, which may be its true edge.

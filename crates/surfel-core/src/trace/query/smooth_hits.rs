@@ -86,21 +86,18 @@ pub fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Surfa
 }
 
 /// Returns true if a ray went through a slit between the points around `disc`, which it passed before `hit` or a miss: it
-/// sees the disc not from its side, and hits a back face or sees points all around, as in a corner whose points leave a gap.
+/// hits a back face, or sees points all around and the disc not from its side, as in a corner whose points leave a gap.
 #[inline(always)]
 fn is_through_slit<L: Lanes>(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit, ray: &Ray) -> bool {
     let Surfel { normal, radius, .. } = cloud.points.surfel(disc.slot);
     if hit.distance <= disc.distance + MIN_SLIT_DEPTH * radius {
         return false;
     }
-    if normal.dot(ray.direction).abs() < MIN_SLIT_COSINE {
-        return false;
-    }
     if cloud.has_front_sides && hit.is_backface {
         return true;
     }
     let around_ray = CandidateHit { normal: -ray.direction, direction: ray.direction, radius };
-    if cloud.edge_test == EdgeTest::Off {
+    if cloud.edge_test == EdgeTest::Off || normal.dot(ray.direction).abs() < MIN_SLIT_COSINE {
         return false;
     }
     let position = ray.at(disc.distance);

@@ -25,7 +25,7 @@ fn hit_before_slit(hit: SurfaceHit, passed_slot: u32, passed_distance: f32, ray:
 }
 
 // Returns true if a ray went through a slit between the points around a disc, which it passed before its hit or a miss:
-// it sees the disc not from its side, and hits a back face or sees points all around.
+// it hits a back face, or sees points all around and the disc not from its side.
 fn is_through_slit(
     disc: Surfel,
     disc_distance: f32,
@@ -36,13 +36,10 @@ fn is_through_slit(
     if hit_distance <= disc_distance + MIN_SLIT_DEPTH * disc.radius {
         return false;
     }
-    if abs(dot(disc.normal, ray.direction)) < MIN_SLIT_COSINE {
-        return false;
-    }
     if visits[visit_idx].has_front_sides == 1u && hit_is_backface {
         return true;
     }
-    if visits[visit_idx].has_edge_test == 0u {
+    if visits[visit_idx].has_edge_test == 0u || abs(dot(disc.normal, ray.direction)) < MIN_SLIT_COSINE {
         return false;
     }
     let position = ray_at(ray, disc_distance);
