@@ -46,8 +46,8 @@ pub fn check_stats(
     if stats == Path::new("-") {
         return Ok(());
     }
-    surfel_formats::check_output_path(stats)?;
     check_is_file(stats)?;
+    surfel_formats::check_output_path(stats)?;
     let objects = description.objects.iter().flat_map(|object| &object.files);
     let inputs = objects.chain(&description.files).chain(typed).map(PathBuf::as_path);
     match inputs.chain([output]).find(|path| is_same_file(path, stats)) {

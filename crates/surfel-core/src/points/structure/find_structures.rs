@@ -7,6 +7,7 @@
 
 use super::above_land::is_above_land;
 use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
+use super::elevation_grid::elevation_grid;
 use super::junctions::join_to_surfaces;
 use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_surface};
 use super::ring_surfaces::close_ring_gaps;
@@ -89,13 +90,19 @@ pub fn find_structures(
     }
     let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
     above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
+    let grid = elevation_grid(positions);
+    if let Some([n_columns, n_rows]) = grid {
+        let line = format!("one point for each cell of a grid of {n_columns}x{n_rows}: a surface");
+        progress.choice(&line, &["structure"]);
+        structures.fill(Structure::Surface);
+    }
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         apply_structure(tree, point, radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
-    if is_land {
+    if is_land && grid.is_none() {
         open_see_through_discs(tree, radii, typical.radius, &mut shapes, progress)?;
     }
     let size = Aabb::of_points(positions.iter().copied()).diagonal();
@@ -341,6 +348,24 @@ mod tests {
             let n_wide = of_lines.iter().filter(|radius| 0.4 < **radius).count();
             assert!(200 < n_wide, "{n_wide}");
         }
+    }
+
+    #[test]
+    fn an_elevation_model_is_a_surface_however_steep() {
+        let n_scatter = |moved: f32| {
+            let point = |i: i32| {
+                let [x, y] = [i % 50, i / 50].map(|line| line as f32);
+                let height = 6.0 * (1.1 * x).sin() * (0.9 * y).cos();
+                Vec3::new(x + moved * (0.37 * i as f32).sin(), y, height)
+            };
+            let cloud = PointCloud::from_positions((0..2500).map(point).collect());
+            let preparation = Preparation { denoise: Denoise::Off, ..Preparation::default() };
+            let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+            cloud.structures().unwrap().iter().filter(|kind| **kind == Structure::Scatter).count()
+        };
+        assert_eq!(n_scatter(0.0), 0);
+        let beside_a_grid = n_scatter(1.0);
+        assert!(1000 < beside_a_grid, "{beside_a_grid}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod edge_planes;
 pub mod typical;
 pub mod octants;
 pub mod plan_cells;
+pub mod elevation_grid;
 pub mod solids;
 pub mod vegetation;
 pub mod above_land;
