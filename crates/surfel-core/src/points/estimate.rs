@@ -143,12 +143,13 @@ fn estimate_by_nearest<'a>(
 }
 
 /// Finds the structures of points, and replaces the estimates by those of their structure. `rings` are those of a spinning
-/// scanner.
+/// scanner; `is_elevation_grid` tells that the cloud had one point for each cell of a horizontal grid.
 pub fn find_shapes<'a>(
     cloud: &'a PointCloud,
     estimates: &mut Estimates<'a>,
     preparation: &Preparation,
     rings: Option<&ScanRings>,
+    is_elevation_grid: bool,
     progress: &dyn Progress,
 ) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
     let Estimates { fits, radii: Some((radii, report)), tree, voters, is_by_gap } = estimates
@@ -161,11 +162,11 @@ pub fn find_shapes<'a>(
     };
     let voters = std::mem::take(voters);
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
-        (StructureChoice::Auto, Some((fits, _))) if has_structure(fits) => {
+        (StructureChoice::Auto, Some((fits, _))) if is_elevation_grid || has_structure(fits) => {
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });
-            find_structures(&tree, fits, radii, voters, rings, progress)?
+            find_structures(&tree, fits, radii, voters, rings, is_elevation_grid, progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,
     };

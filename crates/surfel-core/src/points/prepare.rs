@@ -16,6 +16,7 @@ use super::radii::normal_lengths::take_radii_from_normals;
 use super::radii::radius::{Radius, RadiusReport};
 use super::scan::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::scan::scan_rings::ScanRings;
+use super::structure::elevation_grid::elevation_grid;
 use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
 use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
@@ -109,6 +110,13 @@ pub fn prepare(
         let line = format!("{} of a spinning scanner", counted(rings.len(), "ring"));
         progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
     }
+    // Denoising moves points off the grid.
+    let is_auto = missing.structure && preparation.structure == StructureChoice::Auto;
+    let grid = is_auto.then(|| elevation_grid(&cloud.positions)).flatten();
+    if let Some([n_columns, n_rows]) = grid {
+        let line = format!("one point for each cell of a grid of {n_columns}x{n_rows}: a surface");
+        progress.choice(&line, &["structure"]);
+    }
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
     let estimated = Missing::all(&cloud, preparation);
@@ -117,7 +125,14 @@ pub fn prepare(
     let mut estimates =
         estimate(&cloud.positions, denoised_normals.as_deref(), preparation, &missing, progress)?;
     let mut shapes = match missing.structure {
-        true => find_shapes(&cloud, &mut estimates, preparation, rings.as_ref(), progress)?,
+        true => find_shapes(
+            &cloud,
+            &mut estimates,
+            preparation,
+            rings.as_ref(),
+            grid.is_some(),
+            progress,
+        )?,
         false => None,
     };
     let Estimates { fits, mut radii, tree, .. } = estimates;
