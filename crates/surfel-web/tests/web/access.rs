@@ -25,7 +25,7 @@ async fn assert_denied(server: &TestServer, path: &str, headers: &str) {
 }
 
 fn start_beyond_loopback() -> TestServer {
-    TestServer::start_at("0.0.0.0", Limits::default(), |_| Ok(()))
+    TestServer::start_at("0.0.0.0", Limits::default())
 }
 
 #[tokio::test]
@@ -209,7 +209,7 @@ async fn half_open_connections_do_not_close_a_slow_client_of_another_address() {
 #[tokio::test]
 async fn clients_without_the_token_cannot_keep_a_connection() {
     let limits = Limits { max_pending_connections: 2, ..Limits::default() };
-    let server = TestServer::start_at("0.0.0.0", limits, |_| Ok(()));
+    let server = TestServer::start_at("0.0.0.0", limits);
     let request = "GET /healthz HTTP/1.1\r\nHost: a\r\n\r\n";
     let mut answered = begin(&server, request).await;
     let authorized = format!("GET /stats?token={} HTTP/1.1\r\nHost: a\r\n\r\n", server.token());

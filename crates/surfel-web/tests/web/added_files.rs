@@ -169,7 +169,7 @@ async fn foreign_pages_and_clients_without_the_token_send_nothing() {
         assert_eq!(request(&server, &head, b"12345").await.status, 403, "{headers}");
     }
     assert_eq!(post(&server, &path, b"12345").await.status, 204);
-    let beyond = TestServer::start_at("0.0.0.0", Limits::default(), |_| Ok(()));
+    let beyond = TestServer::start_at("0.0.0.0", Limits::default());
     assert_eq!(post(&beyond, "/files/x", b"12345").await.status, 401);
 }
 

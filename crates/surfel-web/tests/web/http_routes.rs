@@ -92,7 +92,7 @@ async fn renders_are_limited_and_end_with_their_requests() {
 
 #[tokio::test]
 async fn programs_are_rejected_while_files_are_loaded() {
-    let server = TestServer::start_at("127.0.0.1", Limits::default(), |progress| {
+    let server = TestServer::start_loading(|progress| {
         while !progress.is_cancelled() {
             std::thread::sleep(Duration::from_millis(10));
         }

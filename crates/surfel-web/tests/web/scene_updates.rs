@@ -165,7 +165,7 @@ async fn preparation_that_waits_for_another_does_not_deadlock() {
 fn start_loading() -> (TestServer, Arc<Gate>) {
     let gate: Arc<Gate> = Arc::default();
     let loading = gate.clone();
-    let server = TestServer::start_at("127.0.0.1", Limits::default(), move |progress| {
+    let server = TestServer::start_loading(move |progress| {
         progress.begin("points", 0);
         loading.wait();
         Ok(())
@@ -207,7 +207,7 @@ async fn a_server_that_cannot_load_ends_with_the_reason() {
     let load = |_: &dyn surfel_core::progress::Progress| {
         Err(Error::invalid_request("scan.laz: no points"))
     };
-    let mut server = TestServer::start_at("127.0.0.1", Limits::default(), load);
+    let mut server = TestServer::start_loading(load);
     let error = server.join().unwrap_err();
     assert_eq!(error.to_string(), "scan.laz: no points");
 }

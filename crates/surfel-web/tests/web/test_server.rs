@@ -3,7 +3,8 @@
 use crate::hill_provider::{FaultyRenderer, HillProvider};
 use crate::test_page::TestPage;
 use serde_json::json;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -40,17 +41,20 @@ impl TestServer {
 
     /// A server with these limits on loopback.
     pub fn start_with_limits(limits: Limits) -> Self {
-        Self::start_at("127.0.0.1", limits, |_| Ok(()))
+        Self::start_at("127.0.0.1", limits)
     }
 
-    /// A server whose files are loaded once `load` returns.
-    pub fn start_at(
-        host: &str,
-        limits: Limits,
-        load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static,
-    ) -> Self {
+    /// A server with these limits at this host, whose files are loaded.
+    pub fn start_at(host: &str, limits: Limits) -> Self {
         let server = Server::bind(host.parse().unwrap(), 0).unwrap().with_limits(limits);
-        Self::run(server, load)
+        let started = Self::run(server, |_| Ok(()));
+        started.wait_until_loaded();
+        started
+    }
+
+    /// A server on loopback whose files are loaded once `load` returns.
+    pub fn start_loading(load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static) -> Self {
+        Self::run(Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap(), load)
     }
 
     /// A server at this host whose connections are encrypted.
@@ -73,6 +77,22 @@ impl TestServer {
         let run = move || server.run(Arc::new(FaultyRenderer), stop, open);
         let server = Some(std::thread::spawn(run));
         Self { link, provider, frame_ancestors, is_stopped, server }
+    }
+
+    fn wait_until_loaded(&self) {
+        let start = Instant::now();
+        loop {
+            let mut stream = TcpStream::connect(self.socket_address()).unwrap();
+            let request = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+            stream.write_all(request).unwrap();
+            let mut response = String::new();
+            stream.read_to_string(&mut response).unwrap();
+            if response.contains("ready") {
+                return;
+            }
+            assert!(start.elapsed() < TIMEOUT, "the files were never loaded");
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// Host and port.
