@@ -48,15 +48,17 @@ impl Records {
             return Ok(found);
         }
         let rest = input.len() % Self::Surfels.stride();
-        if rest == 0 {
+        let n_surfels = input.len() / Self::Surfels.stride();
+        if rest == 0 && n_surfels < MIN_RETURNS {
             return Ok(Self::Surfels);
         }
         if all.iter().any(fits) {
             return Err(input.malformed(
                 Location::Byte(0),
-                "numbers that are no position and intensity",
-                "x y z within 1000 and an intensity of 0 to 255 in most records of 16 or 20 bytes",
-                "convert the file if it has other records",
+                "numbers that fit no known records",
+                "in most records of 28 bytes a normal of length 1 behind position and radius; in those of 16 or 20 \
+                 bytes x y z within 1000 and an intensity of 0 to 255",
+                "convert the file if it has other records, as to XYZ",
             ));
         }
         Err(input.malformed(

@@ -10,6 +10,7 @@ use surfel_core::scene::Graph;
 use crate::bin;
 use crate::e57;
 use crate::error::{Location, Result};
+use crate::esri_grid;
 use crate::file::{Input, ResourceResolver};
 use crate::gltf;
 use crate::las;
@@ -145,6 +146,16 @@ pub const FORMATS: &[Format] = &[
         },
         inspect: bin::inspect,
         read: Reader::Points(bin::read),
+        writer: None,
+    },
+    Format {
+        name: "ESRI ASCII grid",
+        // Its files end as other texts do.
+        extensions: &[],
+        signature: None,
+        probe: esri_grid::is_grid,
+        inspect: esri_grid::inspect,
+        read: Reader::Points(esri_grid::read),
         writer: None,
     },
     Format {

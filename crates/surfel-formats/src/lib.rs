@@ -37,6 +37,7 @@ mod ptx;
 mod e57;
 mod las;
 mod text;
+mod esri_grid;
 mod obj;
 mod stl;
 mod bin;

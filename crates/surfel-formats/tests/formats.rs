@@ -18,6 +18,8 @@ mod e57_scans;
 mod e57_images;
 #[path = "formats/text.rs"]
 mod text;
+#[path = "formats/esri_grid.rs"]
+mod esri_grid;
 #[path = "formats/text_output.rs"]
 mod text_output;
 #[path = "formats/las_point_formats.rs"]

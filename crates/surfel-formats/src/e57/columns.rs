@@ -25,9 +25,20 @@ pub(super) fn scan_columns(scan: &PointCloud) -> Vec<ScanColumn> {
     let find = |name: RecordName| scan.prototype.iter().position(|record| record.name == name);
     let invalid_color = find(RecordName::IsColorInvalid);
     let invalid_intensity = find(RecordName::IsIntensityInvalid);
+    let is_standard = |wanted: &ColumnRole| {
+        let is_extension = |name: &RecordName| matches!(name, RecordName::Unknown { .. });
+        let mut standard = scan.prototype.iter().filter(|record| !is_extension(&record.name));
+        standard.any(|record| role(&record.name).as_ref() == Some(wanted))
+    };
     let fields = scan.prototype.iter().enumerate();
     let columns = fields.filter_map(|(field, record)| {
-        let role = role(&record.name)?;
+        let role = match (role(&record.name)?, &record.name) {
+            // An extension may hold another value of the same meaning, as a calibrated reflectance.
+            (taken, RecordName::Unknown { name, .. }) if is_standard(&taken) => {
+                ColumnRole::Scalar(name.clone())
+            }
+            (role, _) => role,
+        };
         let scale = match role {
             ColumnRole::Color(channel) => {
                 color_scale(scan.color_limits.as_ref(), channel, &record.data_type)

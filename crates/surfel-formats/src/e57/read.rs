@@ -159,6 +159,14 @@ fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
         let found = format!("{} scans", document.scans.len());
         return Err(malformed(found, format!("at most {MAX_STATIONS}")));
     }
+    // Many scans of the same points would make a small file ask for any memory.
+    let filled = document.scans.iter().filter(|scan| 0 < scan.records);
+    let mut sections: Vec<u64> = filled.map(|scan| scan.file_offset).collect();
+    sections.sort_unstable();
+    if let Some(section) = sections.windows(2).find(|pair| pair[0] == pair[1]) {
+        let found = format!("two scans whose points begin at byte {}", section[0]);
+        return Err(malformed(found, "points of its own for each scan".into()));
+    }
     let checked = document.scans.iter().enumerate().map(|(i, description)| {
         let n_fields = description.prototype.len();
         if MAX_FIELDS < n_fields {

@@ -4,7 +4,7 @@ use surfel_core::points::WITHHELD;
 
 use super::header::{Header, RECORD_LENGTHS, read_f64, text};
 use crate::file::Input;
-use crate::table::{ColumnField, ColumnRole, Field, NumberType};
+use crate::table::{ColumnField, ColumnRole, Field, NumberType, plain_name};
 
 /// User id of the record that describes the extra bytes.
 pub(super) const EXTRA_BYTES_USER_ID: &str = "LASF_Spec";
@@ -128,9 +128,9 @@ fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
         |extra: &ExtraField| extra.field.byte + extra.field.number_type.size() <= n_extra_bytes;
     let columns = fields.into_iter().take_while(is_inside).map(|extra| {
         let role = match ColumnRole::from_name(&extra.name) {
-            Some(role @ (ColumnRole::Normal(_) | ColumnRole::Radius | ColumnRole::Intensity)) => {
-                role
-            }
+            Some(role @ (ColumnRole::Normal(_) | ColumnRole::Radius)) => role,
+            // Synonyms, as a calibrated reflectance, stand beside the intensity.
+            Some(role @ ColumnRole::Intensity) if plain_name(&extra.name) == role.name() => role,
             _ => ColumnRole::Scalar(extra.name),
         };
         let byte = RECORD_LENGTHS[usize::from(header.point_format)] + extra.field.byte;

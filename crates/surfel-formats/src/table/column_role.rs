@@ -47,9 +47,9 @@ impl ColumnRole {
             "nx" | "normalx" => Self::Normal(0),
             "ny" | "normaly" => Self::Normal(1),
             "nz" | "normalz" => Self::Normal(2),
-            "r" | "red" | "diffusered" | "rot" => Self::Color(0),
-            "g" | "green" | "diffusegreen" | "gruen" => Self::Color(1),
-            "b" | "blue" | "diffuseblue" | "blau" => Self::Color(2),
+            "r" | "red" | "diffusered" | "rot" | "rf" => Self::Color(0),
+            "g" | "green" | "diffusegreen" | "gruen" | "gf" => Self::Color(1),
+            "b" | "blue" | "diffuseblue" | "blau" | "bf" => Self::Color(2),
             "i" => Self::Intensity,
             // CloudCompare writes `scalar_` before the names of its scalar fields.
             _ => match plain.strip_prefix("scalar").unwrap_or(&plain) {
@@ -111,7 +111,7 @@ impl ColumnRole {
 
     /// Returns true for the names of a colour's opacity, which a cloud does not keep.
     pub fn is_alpha(name: &str) -> bool {
-        ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
+        ["alpha", "a", "af", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
     }
 }
 

@@ -185,14 +185,21 @@ pub(crate) fn append_rows(
     Ok(())
 }
 
-/// Parses a number in any of the usual spellings, `nan` and `inf` among them.
+/// Words that programs write for a missing number, in upper case; that of the C library of Windows is `-nan(ind)`.
+const MISSING: [&[u8]; 7] =
+    [b"NA", b"N/A", b"NULL", b"NONE", b"-NAN(IND)", b"NAN(IND)", b"-NAN(SNAN)"];
+
+/// Parses a number in any of the usual spellings, `nan`, `inf` and those of a missing number among them.
 pub(crate) fn parse_number(word: &[u8]) -> std::result::Result<f64, LineError> {
-    fast_float2::parse(word).map_err(|_| {
+    fast_float2::parse(word).or_else(|_| {
+        if MISSING.iter().any(|missing| missing.eq_ignore_ascii_case(word)) {
+            return Ok(f64::NAN);
+        }
         let text = word[..word.len().min(40)].escape_ascii();
         let has_comma = word.contains(&b',');
         let expected =
             if has_comma { "a number with a decimal point, not a comma" } else { "a number" };
-        LineError { found: format!("`{text}`"), expected: expected.into() }
+        Err(LineError { found: format!("`{text}`"), expected: expected.into() })
     })
 }
 

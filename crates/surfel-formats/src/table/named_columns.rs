@@ -21,12 +21,21 @@ pub(crate) fn named_columns<'a>(
     let keeps_alpha = choice.names("alpha");
     let fields: Vec<(&str, Field)> =
         fields.filter(|(name, _)| keeps_alpha || !ColumnRole::is_alpha(name)).collect();
-    let colors = fields
-        .iter()
-        .filter(|(name, _)| matches!(ColumnRole::from_name(name), Some(ColumnRole::Color(_))));
-    let float_range = ColorRange::from_floats(colors.flat_map(|(_, field)| {
+    let is_color = |(name, _): &&(&str, Field)| {
+        matches!(ColumnRole::from_name(name), Some(ColumnRole::Color(_)))
+    };
+    let colors = || fields.iter().filter(is_color);
+    let float_range = ColorRange::from_floats(colors().flat_map(|(_, field)| {
         sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
     }));
+    // Some programs write colours of 8 bits as numbers of 16.
+    let is_8_bits = |(_, field): &(&str, Field)| {
+        let mut records = records.chunks_exact(stride);
+        records.all(|record| field.value(record, big_endian) <= 255.0)
+    };
+    let words = colors().filter(|(_, field)| field.file_type == NumberType::U16);
+    let word_range =
+        if words.into_iter().all(is_8_bits) { ColorRange::Bits8 } else { ColorRange::Bits16 };
     let names: Vec<&str> = fields.iter().map(|(name, _)| *name).collect();
     let mut columns: Vec<ColumnField> = Vec::new();
     for (mut role, (name, mut field)) in ColumnRole::from_names(&names).into_iter().zip(fields) {
@@ -41,7 +50,7 @@ pub(crate) fn named_columns<'a>(
         }
         let range = match number_type {
             NumberType::F32 | NumberType::F64 => float_range,
-            NumberType::U16 => ColorRange::Bits16,
+            NumberType::U16 => word_range,
             _ => ColorRange::Bits8,
         };
         if let ColumnRole::Color(_) = role {

@@ -56,7 +56,8 @@ pub(crate) fn read(
         (None, Some(names)) => roles_of_header(names),
         (None, None) if preamble.has_text => return Err(unnamed_text(input, &preamble)),
         (None, None) => {
-            let (columns, description) = infer_columns(&sample.rows, preamble.n_fields);
+            let is_pts = preamble.count.is_some() || input.name.to_lowercase().ends_with(".pts");
+            let (columns, description) = infer_columns(&sample.rows, preamble.n_fields, is_pts);
             let is_survey = columns.first() == Some(&None);
             let example = if is_survey { ", as -,y,x,z if the northing comes first" } else { "" };
             progress.note(&format!(
@@ -244,6 +245,9 @@ fn parse_line(
     let mut n_fields = 0;
     let mut has_empty_end = false;
     for field in preamble.separator.fields(line) {
+        if preamble.has_list && n_fields == columns.len() {
+            break;
+        }
         if let Some(Some(_)) = columns.get(n_fields) {
             let separator = preamble.separator;
             row.push(if field.is_empty() { f64::NAN } else { separator.parse_number(field)? });

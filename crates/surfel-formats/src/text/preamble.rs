@@ -23,6 +23,8 @@ pub(super) struct Preamble {
     pub separator: Separator,
     /// Number of columns.
     pub n_fields: usize,
+    /// True if each line ends with a list of any length, which is not read.
+    pub has_list: bool,
     /// True if the first line of points holds text, too.
     pub has_text: bool,
     /// First byte of the points.
@@ -70,7 +72,7 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             continue;
         }
         let preamble = header.before_points(&fields, separator, start, line_number);
-        return preamble.ok_or_else(|| not_numbers(input, location, text, separator));
+        return preamble.ok_or_else(|| not_numbers(input, location, text));
     }
     let (found, expected) = ("no line with numbers", "x y z in each line");
     Err(input.malformed(Location::Line(line_number), found, expected, "the file holds no points"))
@@ -97,6 +99,8 @@ struct HeaderLines {
     separator: Option<Separator>,
     /// Names in a comment. It may be a header or only mention x, y and z: the number of fields decides.
     comment_names: Option<Vec<String>>,
+    /// True if a list of any length follows the names in a comment, as the track of a point of COLMAP.
+    has_list: bool,
     /// Number of points.
     count: Option<u64>,
 }
@@ -116,7 +120,12 @@ impl HeaderLines {
     /// Keeps the content of a comment, of names and of a number of points. Returns false for any other line.
     fn take(&mut self, fields: &[&[u8]], separator: Separator, is_comment: bool) -> bool {
         if is_comment {
-            self.comment_names = column_names(fields).or(self.comment_names.take());
+            if let Some(mut names) = column_names(fields) {
+                let list = names.iter().position(|name| name.contains("[]"));
+                names.truncate(list.unwrap_or(names.len()));
+                self.has_list = list.is_some();
+                self.comment_names = Some(names);
+            }
             return true;
         }
         if let Some(names) = column_names(fields) {
@@ -144,6 +153,7 @@ impl HeaderLines {
         let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
         let fits = |names: &Vec<String>| {
             names.len() == fields.len()
+                || self.has_list && names.len() < fields.len()
                 || has_empty_end && names.len() + 1 == fields.len()
                 || separator.may_lack_fields(fields.len(), names.len())
         };
@@ -158,13 +168,15 @@ impl HeaderLines {
         if has_text && !is_point {
             return None;
         }
-        let names = self.names.or(self.comment_names.filter(fits));
+        let has_list = self.has_list && self.names.is_none() && header.is_some();
+        let names = self.names.clone().or(self.comment_names.clone().filter(fits));
         let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
         // A separator at the end of each line does not begin a further column.
-        let has_cut_end = has_empty_end || separator.may_lack_fields(fields.len(), n_names);
+        let has_cut_end =
+            has_list || has_empty_end || separator.may_lack_fields(fields.len(), n_names);
         let n_fields = if has_cut_end { n_names } else { fields.len() };
         let count = self.count;
-        Some(Preamble { names, count, separator, n_fields, has_text, data, data_line })
+        Some(Preamble { names, count, separator, n_fields, has_list, has_text, data, data_line })
     }
 }
 
@@ -180,18 +192,8 @@ fn has_numbers_on_axes(
 }
 
 /// Returns the error of a line that holds neither numbers nor a header.
-fn not_numbers(input: &Input, location: Location, text: &[u8], separator: Separator) -> Error {
+fn not_numbers(input: &Input, location: Location, text: &[u8]) -> Error {
     let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
-    let is_number_list = |field: &[u8]| {
-        let mut words = Separator::Whitespace.fields(field);
-        words.all(|word| separator.parse_number(word).is_ok())
-    };
-    let has_inner_space = separator.fields(text).any(|field| field.contains(&b' '));
-    if has_inner_space && separator.fields(text).all(is_number_list) {
-        let expected = "numbers with a decimal point, not a comma";
-        let advice = "replace the decimal commas by points, or separate the fields by semicolons";
-        return input.malformed(location, found, expected, advice);
-    }
     let expected = "numbers, or a header with at least x, y and z, E, N and H or longitude, latitude and height";
     input.malformed(location, found, expected, "remove the line or put # before it")
 }

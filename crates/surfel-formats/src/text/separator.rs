@@ -24,13 +24,24 @@ impl Separator {
         };
         if line.contains(&b';') {
             Self::Semicolon
-        } else if line.contains(&b',') {
+        } else if line.contains(&b',') && !Self::has_decimal_commas(line) {
             Self::Comma
         } else if line.contains(&b'\t') && Self::Tab.fields(line).any(has_spaces) {
             Self::Tab
         } else {
             Self::Whitespace
         }
+    }
+
+    /// Returns true for at least three numbers between blanks in which commas stand for the decimal point.
+    fn has_decimal_commas(line: &[u8]) -> bool {
+        const MIN_NUMBERS: usize = 3;
+        let mut words = Self::Whitespace.fields(line);
+        let is_number = |word: &[u8]| {
+            let has_comma_at_end = word.starts_with(b",") || word.ends_with(b",");
+            !has_comma_at_end && Self::Whitespace.parse_number(word).is_ok()
+        };
+        words.clone().nth(MIN_NUMBERS - 1).is_some() && words.all(is_number)
     }
 
     /// Splits a line into trimmed fields. One in double quotes may hold separators; the quotes are left out.
@@ -44,9 +55,9 @@ impl Separator {
         self == Self::Tab && 1 < n_fields && n_fields < n_columns
     }
 
-    /// Parses a number. Between semicolons a comma may stand for the decimal point.
+    /// Parses a number. A comma may stand for the decimal point, except between commas.
     pub fn parse_number(self, field: &[u8]) -> Result<f64, LineError> {
-        if self == Self::Semicolon
+        if self != Self::Comma
             && field.len() <= MAX_NUMBER_LENGTH
             && let Some(comma) = memchr::memchr(b',', field)
         {
@@ -61,6 +72,7 @@ impl Separator {
 }
 
 /// The fields of a line.
+#[derive(Clone)]
 pub(super) struct Fields<'a> {
     separator: Separator,
     /// Bytes after the last separator; none at the end of the line.
@@ -148,11 +160,22 @@ mod tests {
     }
 
     #[test]
-    fn decimal_commas_are_read_between_semicolons() {
-        let number = |text: &str| Separator::Semicolon.parse_number(text.as_bytes()).ok();
-        assert_eq!(number("1,5"), Some(1.5));
-        assert_eq!(number("-0.5"), Some(-0.5));
-        assert_eq!(number("1.000,5"), None);
+    fn decimal_commas_are_read_except_between_commas() {
+        for separator in [Separator::Semicolon, Separator::Tab, Separator::Whitespace] {
+            let number = |text: &str| separator.parse_number(text.as_bytes()).ok();
+            assert_eq!(number("1,5"), Some(1.5));
+            assert_eq!(number("-0.5"), Some(-0.5));
+            assert_eq!(number("1.000,5"), None);
+        }
         assert!(Separator::Comma.parse_number(b"1,5").is_err());
+    }
+
+    #[test]
+    fn decimal_commas_do_not_separate() {
+        assert_eq!(fields("1,5\t-2,5 3"), ["1,5", "-2,5", "3"]);
+        assert_eq!(fields("1,5 2,5"), ["1", "5 2", "5"]);
+        assert_eq!(fields("1, 2, 3"), ["1", "2", "3"]);
+        assert_eq!(fields("1 ,2 ,3"), ["1", "2", "3"]);
+        assert_eq!(fields("1,2,3 4,5,6 7,8,9").len(), 7);
     }
 }

@@ -103,7 +103,10 @@ fn a_partial_record_is_an_error() {
     );
     let far = file(&[[5e6, 1e7, 2.5, 1.0, 5e6, 1e7, 2.5]; 40]);
     let error = read("a.bin", &far[..69 * 16]).unwrap_err().to_string();
-    assert!(error.contains("no position and intensity"), "{error}");
+    assert!(error.contains("fit no known records"), "{error}");
+    let positions = file(&[[5e6, 1e7, 2.5, 1.0, 5e6, 1e7, 2.5]; 70]);
+    let error = read("a.bin", &positions).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("a normal of length 1"), "{error}");
     assert!(read("a.bin", "").unwrap_err().to_string().contains("an empty file"));
     // These coordinate bits begin with the magic bytes of gzip.
     let coordinate = f32::from_bits(0x3f00_8b1f);

@@ -64,6 +64,49 @@ fn a_field_named_station_is_not_taken_for_the_stations_of_points() {
 }
 
 #[test]
+fn an_extension_stands_beside_the_standard_field_of_its_meaning() {
+    let field = |name| {
+        let data_type = RecordDataType::Integer { min: -100, max: 1000 };
+        record(name, data_type)
+    };
+    let reflectance = RecordName::Unknown { namespace: "nor".into(), name: "reflectance".into() };
+    let values = [RecordValue::Integer(-7), RecordValue::Integer(812)];
+    let scan = Scan {
+        name: "hall",
+        pose: None,
+        prototype: vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+            field(reflectance),
+            field(RecordName::Intensity),
+        ],
+        points: vec![[vec![RecordValue::Double(1.0); 3], values.to_vec()].concat()],
+    };
+    let cloud = read("a.e57", write(&[scan])).unwrap().cloud;
+    assert_eq!(cloud.intensity, Some(vec![812.0]));
+    assert_eq!(cloud.scalar("reflectance").unwrap().get(0), -7.0);
+}
+
+#[test]
+fn scans_that_share_their_points_are_refused() {
+    let scan = |name| Scan {
+        name,
+        pose: None,
+        prototype: vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64],
+        points: vec![vec![RecordValue::Double(1.0); 3]],
+    };
+    let bytes = write(&[scan("a"), scan("b"), scan("c")]);
+    let text = String::from_utf8_lossy(&bytes);
+    let places = text.split("fileOffset=\"").skip(1);
+    let offsets: Vec<&str> = places.filter_map(|rest| rest.split('"').next()).collect();
+    let [.., b, c] = offsets[..] else { panic!("{offsets:?}") };
+    let shared = replace(&bytes, &format!("fileOffset=\"{c}\""), &format!("fileOffset=\"{b}\""));
+    let message = read("a.e57", shared).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("two scans whose points begin at byte"), "{message}");
+}
+
+#[test]
 fn inspect_reads_the_xml_alone() {
     let folder = Folder::new("e57");
     let path = folder.path("a.e57");

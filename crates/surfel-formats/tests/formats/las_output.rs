@@ -181,6 +181,24 @@ fn extra_bytes_keep_their_descriptions() {
 }
 
 #[test]
+fn a_reflectance_in_extra_bytes_stands_beside_the_intensity() {
+    let rename = |name: &[u8; 12]| {
+        let mut bytes = las_file((1, 1));
+        let at = bytes.windows(7).position(|found| found == b"Height\0").unwrap();
+        bytes[at..at + 12].copy_from_slice(name);
+        read("a.las", bytes).unwrap().cloud
+    };
+    let standard = read("a.las", las_file((1, 1))).unwrap().cloud.intensity;
+    let calibrated = rename(b"Reflectance\0");
+    assert_eq!(calibrated.intensity, standard);
+    assert!(calibrated.scalar("Reflectance").is_some());
+    let replaced = rename(b"Intensity\0\0\0");
+    assert!(
+        replaced.intensity != standard && replaced.scalars.iter().all(|s| s.name != "Intensity")
+    );
+}
+
+#[test]
 fn missing_values_in_extra_bytes_are_no_numbers_and_stay_missing() {
     let mut bytes = las_file((1, 1));
     // A record of point format 1 has 28 bytes before the extra bytes, the first of which are the height.

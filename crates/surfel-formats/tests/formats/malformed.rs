@@ -171,7 +171,7 @@ fn overlong_lines_are_rejected() {
     assert!(message("a.xyz", format!("x y z {wide}\n1 2 3\n")).contains("1000 fields"));
     let remark = format!("# {wide}\n1 2 3\n");
     assert_eq!(read("a.xyz", remark).unwrap().cloud.len(), 1);
-    let thousand = "1 ".repeat(1000) + "\n";
+    let thousand = "-7 ".repeat(1000) + "\n";
     assert_eq!(read("a.xyz", thousand).unwrap().cloud.scalars.len(), 997);
     assert!(message("a.obj", format!("v 1 2 3\nv {long}\n")).contains("bytes"));
 

@@ -89,6 +89,7 @@ fn colours_of_any_type_become_16_bit() {
     let color = |kind, values| read("a.ply", file(kind, values)).unwrap().cloud.colors.unwrap()[0];
     assert_eq!(color("uchar", "0 128 255 255"), [0, 128 * 257, 65535]);
     assert_eq!(color("ushort", "0 128 65535 1"), [0, 128, 65535]);
+    assert_eq!(color("ushort", "0 128 255 255"), [0, 128 * 257, 65535]);
     assert_eq!(color("float", "0 0.5 1 1"), [0, 32768, 65535]);
     assert_eq!(color("float", "0 128 300 255"), [0, 128 * 257, 65535]);
 }

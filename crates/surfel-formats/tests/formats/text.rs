@@ -96,6 +96,33 @@ fn columns_are_inferred_and_reported() {
 }
 
 #[test]
+fn three_further_columns_are_normals_only_if_their_values_can_be() {
+    let cloud_of = |lines: &str| read("a.xyz", lines).unwrap().cloud;
+    // Colours of 16 bits, and of 8 bits before a class or further columns.
+    let words = cloud_of("1 2 3 41216 38656 30208\n2 2 3 41000 256 0\n3 2 3 0 0 299\n");
+    assert_eq!(words.colors.map(|colors| colors[1]), Some([41000, 256, 0]));
+    let class = cloud_of("1 2 3 200 180 160 12.000000\n1 2 4 90 88 80 2.000000\n");
+    assert_eq!(class.colors.map(|colors| colors[0]), Some([200, 180, 160].map(|v| v * 257)));
+    assert_eq!(class.intensity, Some(vec![12.0, 2.0]));
+    let pts = read("a.pts", "1 2 3 200 180 160 12\n").unwrap().cloud;
+    assert_eq!(pts.intensity, Some(vec![200.0]));
+    for lines in ["1 2 3 200 180 160 812 2\n", "1 2 3 200 180 160 812 1 2\n"] {
+        let cloud = cloud_of(lines);
+        assert_eq!(cloud.scalar("column 7").unwrap().get(0), 812.0, "{lines}");
+        assert_eq!(cloud.colors.map(|colors| colors[0][0]), Some(200 * 257), "{lines}");
+        assert_eq!(cloud.normals, None, "{lines}");
+    }
+    // Intensity, return and number of returns.
+    let returns = cloud_of("1 2 3 812 1 2\n1 2 3 1300 1 1\n");
+    assert_eq!((returns.colors, returns.normals, returns.scalars.len()), (None, None, 3));
+    // Normals whose lengths are radii, and missing ones.
+    let radii = cloud_of("10 0 0 0.5 -0.2 0\n0 10 0 0.1 0.3 0.2\n");
+    assert_eq!(radii.normals.map(|normals| normals.len()), Some(2));
+    let missing = cloud_of("1 2 3 0 0 0\n1 2 3 0.6 0 0.8\n");
+    assert_eq!(missing.normals.map(|normals| normals[1]), Some(Vec3::new(0.6, 0.0, 0.8)));
+}
+
+#[test]
 fn a_first_column_that_numbers_the_points_is_skipped() {
     let cloud_of = |first: fn(usize) -> usize| {
         let lines = (0..200).map(|i| format!("{} 7 8 {i}\n", first(i)));
@@ -104,6 +131,10 @@ fn a_first_column_that_numbers_the_points_is_skipped() {
     let numbered = cloud_of(|i| i + 1);
     let position = numbered.world_position(3);
     assert_eq!((position, numbered.intensity), (DVec3::new(7.0, 8.0, 3.0), None));
+    let lines = (0..200).map(|i| format!("{} 7 8 {i} 200 180 160\n", i + 1));
+    let colored = read("a.txt", lines.collect::<String>()).unwrap().cloud;
+    assert_eq!(colored.world_position(3), DVec3::new(7.0, 8.0, 3.0));
+    assert_eq!(colored.colors.map(|colors| colors[0]), Some([200, 180, 160].map(|v| v * 257)));
     // The first column of a grid of points starts again with each row.
     let grid = cloud_of(|i| i % 20);
     assert_eq!(grid.world_position(3), DVec3::new(3.0, 7.0, 8.0));
@@ -153,7 +184,7 @@ fn invalid_lines_are_errors_with_a_line_number() {
          --salvage reads what is whole"
     );
     assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
-    assert!(message("1,5 2,5 3,5\n").contains("not a comma"));
+    assert!(message("1,2,3\n1,5;2,5;3,5\n").contains("`5;2`, expected a number"));
     assert!(message("1 2\n3 4\n").contains("2 columns without z"));
     assert!(message("hello world\n").contains("expected numbers, or a header"));
     assert!(message("# only words\n").contains("no line with numbers"));
@@ -302,4 +333,43 @@ fn lines_may_lack_fields_only_in_proportion_to_their_length() {
     assert!(cloud.scalars[36].values.get(2).is_nan());
     let error = read("a.txt", file(1000)).unwrap_err().to_string();
     assert!(error.contains("line 2: found 3 fields, expected 1000 as in"), "{error}");
+}
+
+#[test]
+fn a_list_behind_the_columns_is_not_read() {
+    let file = "# 3D point list with one line of data per point:\n\
+        #   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n\
+        # Number of points: 2, mean track length: 2.5\n\
+        63390 1.5 0.25 0.5 115 121 122 1.34 16 6542 15 7345\n7 2 3 4 1 2 3 0.5 16 6542\n";
+    let cloud = read("points3D.txt", file).unwrap().cloud;
+    assert_eq!(cloud.positions, [Vec3::new(1.5, 0.25, 0.5), Vec3::new(2.0, 3.0, 4.0)]);
+    assert_eq!(cloud.colors.as_ref().unwrap()[1], [257, 514, 771]);
+    assert_eq!(cloud.scalar("ERROR").unwrap().get(0), 1.34);
+    let short = read("points3D.txt", file.replace("7 2 3 4 1 2 3 0.5 16 6542", "7 2 3 4 1 2"));
+    assert!(short.map(|_| ()).unwrap_err().to_string().contains("6 fields, expected 8"));
+}
+
+#[test]
+fn decimal_commas_between_blanks_are_read() {
+    for file in ["1,5\t2,25\t-3,5\n4\t5\t6\n", "X Y Z\n1,5 2,25 -3,5\n4 5 6\n"] {
+        let cloud = read("a.txt", file).unwrap().cloud;
+        assert_eq!(cloud.positions, [Vec3::new(1.5, 2.25, -3.5), Vec3::new(4.0, 5.0, 6.0)]);
+    }
+}
+
+#[test]
+fn words_for_missing_numbers_are_read() {
+    let file = "X,Y,Z,Intensity,Dist\n1,2,3,NA,0.5\n4,5,6,7,-nan(ind)\n7,8,9,null,N/A\n";
+    let cloud = read("a.csv", file).unwrap().cloud;
+    let intensity = cloud.intensity.as_ref().unwrap();
+    assert!(intensity[0].is_nan() && intensity[1] == 7.0 && intensity[2].is_nan());
+    let distances = cloud.scalar("Dist").unwrap();
+    assert!(distances.get(0) == 0.5 && distances.get(1).is_nan() && distances.get(2).is_nan());
+}
+
+#[test]
+fn float_colours_of_cloudcompare_are_colours() {
+    let cloud = read("a.txt", "//X Y Z Rf Gf Bf Af\n1 2 3 0.8 0.2 1 0.5\n").unwrap().cloud;
+    assert_eq!(cloud.colors, Some(vec![[52428, 13107, 65535]]));
+    assert!(cloud.scalars.is_empty());
 }

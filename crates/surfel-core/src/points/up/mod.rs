@@ -1,0 +1,18 @@
+//! The up axis of clouds whose file does not state it.
+//!
+//! - `inferred_up` and `sample`: the answer, and the points that are looked at;
+//! - `axis_statistics`: floors, flat bases and terrain, by the points near the ends of each axis;
+//! - `mirror_symmetry`: the axis along which an object is its own mirror image;
+//! - `infer_up`: the choice between them and the convention of a file's format.
+//!
+//! A file uses only those above it.
+
+mod inferred_up;
+mod sample;
+mod axis_statistics;
+mod mirror_symmetry;
+mod infer_up;
+
+pub use infer_up::{UpConvention, infer_up};
+pub(crate) use infer_up::{is_camera_frame, is_in_camera_view, is_mostly_land, is_terrain};
+pub use inferred_up::InferredUp;
