@@ -96,7 +96,10 @@ prepare_browser() {
     missing="playwright-core and axe-core are not in $PLAYWRIGHT, and npm is not installed"
     command -v npm >/dev/null || return
     missing="npm cannot install playwright-core and axe-core into $PLAYWRIGHT"
-    npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core axe-core >"$log" 2>&1
+    # Another run may look for the folder at the same time, so it appears as a whole.
+    local fresh="$PLAYWRIGHT.$$"
+    npm install --silent --no-audit --no-fund --prefix "$fresh" playwright-core axe-core >"$log" 2>&1 || return
+    mv -T "$fresh" "$PLAYWRIGHT" 2>/dev/null || { rm -rf "$PLAYWRIGHT" && mv "$fresh" "$PLAYWRIGHT"; }
 }
 
 # Builds the wheel, installs it into a fresh environment of the newest Python and into one of the oldest, and runs

@@ -59,6 +59,8 @@ const TIMING: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 /// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
 const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
+/// The same for software, whose pieces take seconds, and longer beside other work.
+const SOFTWARE_WAIT_TIMEOUT: Duration = Duration::from_secs(1200);
 
 /// Returns all devices, those first that are preferred.
 pub fn devices() -> Vec<DeviceInfo> {
@@ -248,11 +250,15 @@ impl Gpu {
     }
 
     fn wait_until(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
-        let wait = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_TIMEOUT) };
+        let timeout = match self.info.kind {
+            DeviceKind::Software => SOFTWARE_WAIT_TIMEOUT,
+            _ => WAIT_TIMEOUT,
+        };
+        let wait = wgpu::PollType::Wait { submission_index, timeout: Some(timeout) };
         let polled = self.device.poll(wait);
         self.check()?;
         polled.map(drop).map_err(|_| {
-            let secs = WAIT_TIMEOUT.as_secs();
+            let secs = timeout.as_secs();
             self.keep_failure(format!("did not finish within {secs} seconds"))
         })
     }

@@ -79,7 +79,11 @@ fn second_signal_kills_blocked_process() {
     send("-INT", &child);
     wait_for_delivery(&child);
     assert!(child.try_wait().unwrap().is_none(), "the first signal killed the process");
-    send("-TERM", &child);
+    // The process may not have handled the first signal yet.
+    while child.try_wait().unwrap().is_none() {
+        send("-TERM", &child);
+        std::thread::sleep(Duration::from_millis(20));
+    }
     assert_eq!(wait(&mut child).signal(), Some(SIGTERM));
 }
 

@@ -217,7 +217,7 @@ mod tests {
             ("exit 3", "exit status: 3"),
             // A program that fills standard error before it reads its input.
             ("yes 'too much' | head -c 1000000 >&2; exit 1", "too much"),
-            ("exec <&-; echo closed >&2; exit 1", "closed"),
+            ("echo closed >&2; exec <&-; exit 1", "closed"),
         ];
         for (commands, expected) in failing {
             let program = movie.script(commands);
