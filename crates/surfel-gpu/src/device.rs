@@ -59,7 +59,7 @@ const TIMING: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 /// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
 const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
-/// The same for software, whose pieces take seconds, and longer beside other work.
+/// Time for devices of software, whose pieces take seconds, and longer beside other work.
 const SOFTWARE_WAIT_TIMEOUT: Duration = Duration::from_secs(1200);
 
 /// Returns all devices, those first that are preferred.

@@ -12,7 +12,7 @@ use super::radii::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::scan::scan_grid::ScanGrids;
 use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
-use super::structure::find_structures::{all_scattered, find_structures};
+use super::structure::find_structures::{Evidence, all_scattered, find_structures};
 use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
@@ -166,7 +166,9 @@ pub fn find_shapes<'a>(
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });
-            find_structures(&tree, fits, radii, voters, rings, is_elevation_grid, progress)?
+            let stated_normals = cloud.normals.as_deref();
+            let evidence = Evidence { rings, is_elevation_grid, stated_normals };
+            find_structures(&tree, fits, radii, voters, &evidence, progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,
     };

@@ -13,6 +13,7 @@ use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
 use super::see_through::open_see_through_discs;
 use super::solids::{apply_structure, ball_radius, clamp_solids};
+use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
 use super::typical::Typical;
@@ -38,9 +39,19 @@ const N_WIDEST_NEIGHBORS: usize = 144;
 /// Maximum surface variation of so many neighbours of a surface. Crowns have more.
 const MAX_WIDEST_VARIATION: f32 = 0.03;
 
+/// The knowledge about a cloud beside its positions.
+#[derive(Default)]
+pub struct Evidence<'a> {
+    /// Rings of a spinning scanner with its place, relative to the origin of the cloud.
+    pub rings: Option<(&'a [Ring], Vec3)>,
+    /// True if the cloud had one point for each cell of a horizontal grid. All its points are of a surface.
+    pub is_elevation_grid: bool,
+    /// Normals of the file; zero where it has none.
+    pub stated_normals: Option<&'a [Vec3]>,
+}
+
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
-/// of them. `voters` are those of each point; if it is empty, they are searched where they are needed. `rings` are those of
-/// a spinning scanner at `scanner`, relative to the origin of the cloud. All points of an elevation grid are of a surface.
+/// of them. `voters` are those of each point; if it is empty, they are searched where they are needed.
 ///
 /// # Errors
 ///
@@ -50,10 +61,10 @@ pub fn find_structures(
     fits: &[PlaneFit],
     radii: &[f32],
     voters: Vec<Voters>,
-    rings: Option<(&[Ring], Vec3)>,
-    is_elevation_grid: bool,
+    evidence: &Evidence,
     progress: &dyn Progress,
 ) -> Result<(Vec<PointShape>, StructureReport)> {
+    let Evidence { rings, is_elevation_grid, stated_normals } = *evidence;
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
     let typical = Typical::of(fits, radii);
@@ -93,6 +104,9 @@ pub fn find_structures(
     } else {
         let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
         above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
+        if let Some(normals) = stated_normals {
+            join_by_stated_normals(tree, normals, &mut structures, &mut shapes, progress)?;
+        }
         structures
     };
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
