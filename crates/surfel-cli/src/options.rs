@@ -27,6 +27,9 @@ pub const EVERYWHERE: &str = "Everywhere";
 /// Heading of the options of plans, which only pictures have.
 pub const PLANS: &str = "Plans to scale";
 
+/// Kinds of values that may begin with a hyphen, beside lists of numbers.
+const MAY_BEGIN_WITH_HYPHEN: [&str; 4] = ["AREA", "AXIS", "BOUNDS", "NAMES"];
+
 /// The keys of a scope with their paths and headings.
 fn keys<S: Scope>() -> impl Iterator<Item = (String, &'static str, Key)> {
     let keys = SceneDescription::keys().into_iter();
@@ -57,7 +60,7 @@ fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
         "HEIGHT" => arg.value_name("HEIGHT").num_args(0..=1).default_missing_value("true"),
         name => arg
             .value_name(name)
-            .allow_hyphen_values(name.contains(',') || ["AXIS", "BOUNDS", "NAMES"].contains(&name)),
+            .allow_hyphen_values(name.contains(',') || MAY_BEGIN_WITH_HYPHEN.contains(&name)),
     }
 }
 
@@ -130,6 +133,15 @@ mod tests {
         assert_eq!(description.objects_default.preparation.vertices, Some(true));
         let off = parse(["--camera-orthographic=false"]);
         assert_eq!(off.get("camera.orthographic"), Some(json!(false)));
+    }
+
+    #[test]
+    fn values_may_begin_with_a_hyphen() {
+        let words = "--crop -10,-10,10,10 --clip-box -1,-2,-3,1,2,3 --up -Y --range -5,5 --clip-plane -1,0,0,-1,0,0";
+        let description = parse(words.split_whitespace());
+        for key in ["crop", "clip_box", "up", "range", "clip_plane"] {
+            assert!(description.get(key).is_some(), "{key}");
+        }
     }
 
     #[test]
