@@ -144,9 +144,9 @@ fn command() -> ClapCommand {
 
 fn exit_code(error: &anyhow::Error) -> u8 {
     let is_cancelled = error.chain().any(|cause| {
-        let by_library =
-            cause.downcast_ref::<surfel::Error>().is_some_and(surfel::Error::is_cancelled);
-        by_library || cause.downcast_ref() == Some(&surfel_core::Error::Cancelled)
+        cause.downcast_ref().is_some_and(surfel::Error::is_cancelled)
+            || cause.downcast_ref().is_some_and(surfel_formats::Error::is_cancelled)
+            || cause.downcast_ref() == Some(&surfel_core::Error::Cancelled)
     });
     if is_cancelled {
         return interrupt::exit_code();
@@ -186,4 +186,25 @@ pub fn silence_decoder_panics() {
             default(panic);
         }
     }));
+}
+
+#[cfg(test)]
+mod tests {
+    //! Exit codes follow from errors.
+
+    use super::*;
+
+    #[test]
+    fn cancelled_work_of_every_library_has_the_code_of_the_signal() {
+        let cancelled = || surfel_core::Error::Cancelled;
+        let file = || surfel_formats::Error::from(cancelled());
+        let errors: [anyhow::Error; 4] = [
+            cancelled().into(),
+            file().into(),
+            surfel::Error::File(file()).into(),
+            anyhow::Error::from(file()).context("demo.laz"),
+        ];
+        assert_eq!(errors.map(|error| exit_code(&error)), [130; 4]);
+        assert_eq!(exit_code(&surfel_formats::Error::NoInput.into()), 1);
+    }
 }

@@ -167,6 +167,11 @@ pub enum Location {
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
+    /// Returns true if the work was cancelled.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Core(surfel_core::Error::Cancelled))
+    }
+
     /// Returns what is wrong with a damaged file, without its name and without advice.
     pub(crate) fn damage(&self) -> String {
         match self {

@@ -46,15 +46,14 @@ pub enum Error {
 impl Error {
     /// Returns true if the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
-        if let Self::Unfinished { cause, .. } = self {
-            return cause.is_cancelled();
+        match self {
+            Self::Unfinished { cause, .. } => cause.is_cancelled(),
+            Self::File(error) => error.is_cancelled(),
+            Self::Core(cause) | Self::Content { cause, .. } => {
+                matches!(cause, surfel_core::Error::Cancelled)
+            }
+            _ => false,
         }
-        matches!(
-            self,
-            Self::Core(surfel_core::Error::Cancelled)
-                | Self::File(surfel_formats::Error::Core(surfel_core::Error::Cancelled))
-                | Self::Content { cause: surfel_core::Error::Cancelled, .. }
-        )
     }
 }
 
