@@ -142,6 +142,55 @@ impl CameraSettings {
     }
 
     /// Returns true for an equirectangular picture all around.
+    /// Returns the key that states a direction of view, if one is set.
+    fn direction_key(&self) -> Option<&'static str> {
+        let is_set = [
+            ("camera.direction", self.direction.is_some()),
+            ("camera.azimuth_angle", self.azimuth_angle.is_some()),
+            ("camera.elevation_angle", self.elevation_angle.is_some()),
+        ];
+        is_set.into_iter().find(|(_, is_set)| *is_set).map(|(key, _)| key)
+    }
+
+    /// Returns true if a height is set, which says what is seen whatever the zoom factor is.
+    fn has_fixed_height(&self) -> bool {
+        matches!(self.orthographic, Some(OrthographicHeight::Fixed(_)))
+    }
+
+    /// Unsets what `over` takes the place of: position, focal point and view-up if it states a direction, which would have
+    /// no effect beside them, the height if it zooms, and the zoom if it states a height.
+    pub(super) fn unset_excluded_by(&mut self, over: &Self) {
+        if over.has_fixed_height() {
+            self.zoom_factor = None;
+        } else if over.zoom_factor.is_some() && self.has_fixed_height() {
+            self.orthographic = Some(OrthographicHeight::Fit);
+        }
+        let is_fixed = (self.position.is_some() || over.position.is_some())
+            && (self.focal_point.is_some() || over.focal_point.is_some());
+        if is_fixed && over.direction_key().is_some() {
+            (self.position, self.focal_point, self.view_up) = Default::default();
+        }
+    }
+
+    /// Checks that no zoom stands beside a height, and no direction beside a position and a focal point, which state it
+    /// already.
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        if self.has_fixed_height() && self.zoom_factor.is_some() {
+            let text =
+                "does not change the height that camera.orthographic states; leave out one of them";
+            return Err(Invalid::at("camera.zoom_factor", text));
+        }
+        let (Some(position), Some(focal_point)) = (self.position, self.focal_point) else {
+            return Ok(());
+        };
+        if position == focal_point {
+            let text = "is the focal point too; move one of them";
+            return Err(Invalid::at("camera.position", text));
+        }
+        let text = "camera.position and camera.focal_point state the direction already; leave out one of the three";
+        self.direction_key().map_or(Ok(()), |key| Err(Invalid::at(key, text)))
+    }
+
     pub fn is_panorama(&self) -> bool {
         self.panorama == Some(true)
     }

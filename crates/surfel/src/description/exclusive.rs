@@ -25,6 +25,7 @@ const EXCLUSIVE: &[(&str, &[&str])] = &[
             "camera.view_angle",
         ],
     ),
+    ("camera.orthographic", &["camera.view_angle"]),
     ("camera.direction", &["camera.azimuth_angle", "camera.elevation_angle"]),
     ("camera.position", &["camera.zoom_factor"]),
     (

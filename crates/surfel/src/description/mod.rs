@@ -280,7 +280,8 @@ impl SceneDescription {
 
     /// Lays another description over this one: its keys count, its objects, lamps and animations are added.
     ///
-    /// Keys of this one that exclude a key of the other are unset; keys that are false exclude nothing.
+    /// Keys of this one that exclude a key of the other are unset; keys that are false exclude nothing. A direction of view
+    /// takes the place of a position and a focal point, beside which it would have no effect, and a zoom that of a height.
     pub fn overlay(&mut self, over: Self) {
         for part in over.parts() {
             let keys = part.settings.keys();
@@ -291,6 +292,7 @@ impl SceneDescription {
             }
         }
         self.run.unset_excluded_by(&over.run);
+        self.camera.unset_excluded_by(&over.camera);
         self.output.overlay(&over.output);
         self.picture.overlay(&over.picture);
         self.plan.overlay(&over.plan);
@@ -344,9 +346,7 @@ impl SceneDescription {
     pub fn check(&self) -> Result<(), Invalid> {
         exclusive::check(&self.parts())?;
         self.run.check()?;
-        if self.camera.position.is_some() && self.camera.position == self.camera.focal_point {
-            return Err(Invalid::at("camera.position", "is the focal point too; move one of them"));
-        }
+        self.camera.check()?;
         let has_others = self.light.light.as_ref().is_some_and(|kinds| 1 < kinds.len());
         if self.light.has(LightKind::None) && has_others {
             return Err(Invalid::at("light", "none excludes all other lights; leave them out"));

@@ -108,6 +108,58 @@ fn an_overlay_overrides_keys_and_unsets_excluded_ones() {
 }
 
 #[test]
+fn a_direction_over_a_scene_replaces_its_position_and_focal_point() {
+    let view = "[camera]\nposition = [1, 2, 3]\nfocal-point = [4, 5, 6]\nview-up = [0, 1, 0]\nview-angle = 20";
+    let turned = |scene: &str, over: &str| {
+        let mut scene = parse(scene).unwrap();
+        scene.overlay(parse(over).unwrap());
+        assert_eq!(scene.check(), Ok(()), "{over}");
+        scene.camera
+    };
+    for over in ["direction = [0, 0, -1]", "azimuth-angle = 0", "elevation-angle = 30"] {
+        let camera = turned(view, &format!("[camera]\n{over}"));
+        assert_eq!((camera.position, camera.focal_point, camera.view_up), (None, None, None));
+        assert_eq!(camera.view_angle, Some(20.0));
+    }
+    // What the upper layer sets itself stays, and a position or a focal point alone leaves the direction open.
+    let camera = turned(view, "[camera]\nazimuth-angle = 30\nposition = [7, 8, 9]");
+    assert_eq!((camera.position.map(|p| p.x), camera.focal_point), (Some(7.0), None));
+    for key in ["position", "focal-point"] {
+        let scene = format!("[camera]\n{key} = [1, 2, 3]\nview-up = [0, 1, 0]");
+        let camera = turned(&scene, "camera.azimuth-angle = 30");
+        let kept = camera.position.or(camera.focal_point);
+        assert_eq!((kept.map(|point| point.z), camera.view_up), (Some(3.0), Some(DVec3::Y)));
+    }
+}
+
+#[test]
+fn a_direction_beside_a_position_and_a_focal_point_is_refused() {
+    let view = "[camera]\nposition = [1, 2, 3]\nfocal-point = [4, 5, 6]";
+    for key in ["direction = [0, 0, -1]", "azimuth-angle = 30", "elevation-angle = 30"] {
+        let found = error(&format!("{view}\n{key}"));
+        assert!(found.contains("state the direction already"), "{found}");
+    }
+}
+
+#[test]
+fn a_height_and_a_zoom_replace_each_other() {
+    let [zoomed, of_height] =
+        ["zoom-factor = 4", "orthographic = 5"].map(|text| format!("[camera]\n{text}"));
+    assert!(error(&format!("{zoomed}\northographic = 5")).contains("does not change the height"));
+    let overlaid = |below: &str, above: &str| {
+        let mut scene = parse(below).unwrap();
+        scene.overlay(parse(above).unwrap());
+        assert_eq!(scene.check(), Ok(()));
+        (scene.camera.zoom_factor, scene.camera.orthographic)
+    };
+    let height = Some(OrthographicHeight::Fixed(5.0));
+    assert_eq!(overlaid(&zoomed, &of_height), (None, height));
+    assert_eq!(overlaid(&of_height, &zoomed), (Some(4.0), Some(OrthographicHeight::Fit)));
+    assert!(parse(&format!("{zoomed}\northographic = true")).is_ok());
+    assert!(error("[camera]\northographic = true\nview-angle = 60").contains("excludes"));
+}
+
+#[test]
 fn false_lies_over_what_a_scene_sets() {
     let mut scene = parse("[camera]\northographic = 12").unwrap();
     scene.overlay(parse("camera.orthographic = false").unwrap());
