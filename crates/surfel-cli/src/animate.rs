@@ -3,6 +3,7 @@
 use crate::cluster;
 use crate::global::{Global, check_device, start_threads};
 use crate::options::{EVERYWHERE, PLANS, Scope};
+use crate::output::check_replaces_nothing;
 use crate::render::{report_threads, with_info};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
@@ -60,6 +61,12 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     check_device(&description.run)?;
     if description.output.output.is_none() && !args.dry_run {
         return Err(Usage("name the movie with -o, as in -o movie.mp4".into()).into());
+    }
+    if let Some(output) = &description.output.output {
+        check_replaces_nothing(
+            &[("-o", output)],
+            description.named_files().chain(&args.scene.files),
+        )?;
     }
     match (&args.cluster, &description.output.output) {
         (Some(address), Some(output)) if !args.dry_run => {

@@ -59,10 +59,12 @@ pub fn expand_content(words: &[PathBuf], report: &Report) -> anyhow::Result<Vec<
     let files = expand(words, report)?;
     match files.iter().find(|file| is_scene_file(file)) {
         None => Ok(files),
-        Some(file) => anyhow::bail!(
-            "{}: is a scene file, which surfel render, animate and view take; name the files in it",
-            file.display()
-        ),
+        Some(file) => {
+            let file = file.display();
+            let text =
+                "is a scene file, which surfel render, animate and view take; name the files in it";
+            Err(Usage(format!("{file}: {text}")).into())
+        }
     }
 }
 

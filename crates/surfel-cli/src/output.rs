@@ -3,7 +3,9 @@
 use crate::usage::Usage;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
-use surfel::SceneDescription;
+
+/// Name of standard output.
+const STDOUT: &str = "-";
 
 /// Fails where a picture could not be written.
 pub fn check_picture(path: &Path) -> anyhow::Result<()> {
@@ -25,39 +27,36 @@ fn usage_error(error: surfel_formats::Error) -> anyhow::Error {
     }
 }
 
-/// Fails where a height map could not be written, or would take the place of the picture.
-pub fn check_height_map(path: &Path, picture: &Path) -> anyhow::Result<()> {
-    surfel_formats::check_height_map(path)?;
-    check_is_file(path)?;
-    if is_same_file(path, picture) {
-        let text = "picture and height map have the same name; name another file for one";
-        return Err(Usage(text.into()).into());
-    }
-    Ok(())
+/// Fails where a height map could not be written.
+pub fn check_height_map(path: &Path) -> anyhow::Result<()> {
+    surfel_formats::check_height_map(path).map_err(usage_error)?;
+    check_is_file(path)
 }
 
-/// Fails where the numbers of a run would take the place of the picture, or of what it is made from.
-pub fn check_stats(
-    stats: &Path,
-    output: &Path,
-    typed: &[PathBuf],
-    description: &SceneDescription,
-) -> anyhow::Result<()> {
-    if stats == Path::new("-") {
+/// Fails where the numbers of a run could not be written.
+pub fn check_stats(path: &Path) -> anyhow::Result<()> {
+    if path == Path::new(STDOUT) {
         return Ok(());
     }
-    check_is_file(stats)?;
-    surfel_formats::check_output_path(stats)?;
-    let objects = description.objects.iter().flat_map(|object| &object.files);
-    let inputs = objects.chain(&description.files).chain(typed).map(PathBuf::as_path);
-    match inputs.chain([output]).find(|path| is_same_file(path, stats)) {
-        Some(path) => {
-            let name = path.display();
-            let text = format!("--stats {name}: would replace that file; name another");
-            Err(Usage(text).into())
+    check_is_file(path)?;
+    Ok(surfel_formats::check_output_path(path)?)
+}
+
+/// Fails if an output would replace a file that is read, or another output. Each output has the option that names it.
+pub fn check_replaces_nothing<'p>(
+    outputs: &[(&str, &Path)],
+    inputs: impl IntoIterator<Item = &'p PathBuf>,
+) -> anyhow::Result<()> {
+    let mut others: Vec<&Path> = inputs.into_iter().map(PathBuf::as_path).collect();
+    for (option, output) in outputs.iter().filter(|(_, path)| *path != Path::new(STDOUT)) {
+        if let Some(other) = others.iter().find(|other| is_same_file(other, output)) {
+            let name = other.display();
+            let text = format!("{option} {name}: would replace that file; name another output");
+            return Err(Usage(text).into());
         }
-        None => Ok(()),
+        others.push(output);
     }
+    Ok(())
 }
 
 /// Returns true if two paths name one file. A file that does not exist yet is compared by its folder.

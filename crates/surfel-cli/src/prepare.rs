@@ -1,12 +1,11 @@
 //! `surfel prepare`: clean, subsample, outliers, noise, normals, orientation, radius, each alone or all.
 
-use crate::Usage;
 use crate::global::Global;
 use crate::inputs::expand_content;
 use crate::options::{KeyOptions, Scope};
-use crate::output::check_cloud;
+use crate::output::{check_cloud, check_replaces_nothing};
 use crate::report::Report;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use surfel::SceneDescription;
 use surfel::prepare::{PrepareOptions, prepare_files};
 use surfel_core::progress::Progress;
@@ -67,7 +66,8 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let description = SceneDescription { run, ..args.options.description.clone()? };
     check_cloud(&args.output)?;
     let files = expand_content(&args.files, report)?;
-    refuse_input_as_output(&files, &args.output)?;
+    // What a preparation drops would be lost.
+    check_replaces_nothing(&[("-o", &args.output)], files.iter().chain(description.named_files()))?;
     let options = PrepareOptions { normals: args.normals, keep_variation: args.keep_variation };
     let Loaded { cloud, info } = prepare_files(&files, &description, options, report)?;
     let options = SaveOptions::from_source(&info);
@@ -76,20 +76,4 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let points = counted(cloud.len(), "point");
     report.note(&format!("{}: {points}", args.output.display()));
     Ok(())
-}
-
-/// Fails if the output would replace a file that is read: what a preparation drops would be lost.
-fn refuse_input_as_output(files: &[PathBuf], output: &Path) -> anyhow::Result<()> {
-    let Ok(output) = output.canonicalize() else { return Ok(()) };
-    let is_output = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file == output);
-    match files.iter().find(is_output) {
-        None => Ok(()),
-        Some(file) => {
-            let file = file.display();
-            Err(Usage(format!(
-                "{file} would be replaced by its prepared form; name another output"
-            ))
-            .into())
-        }
-    }
 }

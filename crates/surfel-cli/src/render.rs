@@ -2,7 +2,7 @@
 
 use crate::global::{Global, check_device, start_threads};
 use crate::options::{EVERYWHERE, Scope};
-use crate::output::{check_height_map, check_picture, check_stats};
+use crate::output::{check_height_map, check_picture, check_replaces_nothing, check_stats};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use crate::stats::{self, RunStats, Seconds};
@@ -77,14 +77,21 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         let text = "picture and stats cannot both go to stdout; name a file for one";
         return Err(Usage(text.into()).into());
     }
-    check_picture(&output)?;
-    if let Some(stats) = &args.stats {
-        check_stats(stats, &output, &args.scene.files, &description)?;
-    }
-    if let Some(heights) = &description.plan.height_map {
-        check_height_map(heights, &output)?;
-    }
+    check_outputs(args, &description, &output)?;
     render_to_file(&description, &output, args.stats.as_deref(), report)
+}
+
+/// Fails where a result could not be written, or would replace a file.
+fn check_outputs(args: &Args, description: &SceneDescription, output: &Path) -> anyhow::Result<()> {
+    let heights = description.plan.height_map.as_deref();
+    let stats = args.stats.as_deref();
+    check_picture(output)?;
+    stats.map_or(Ok(()), check_stats)?;
+    heights.map_or(Ok(()), check_height_map)?;
+    let others = [("--height-map", heights), ("--stats", stats)];
+    let others = others.into_iter().filter_map(|(option, path)| Some((option, path?)));
+    let outputs: Vec<(&str, &Path)> = [("-o", output)].into_iter().chain(others).collect();
+    check_replaces_nothing(&outputs, description.named_files().chain(&args.scene.files))
 }
 
 /// Renders a description to a file, and writes numbers about the run to another.

@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
-use surfel::description::{CameraSettings, Crop, ObjectDescription, write_table};
+use surfel::description::{CameraSettings, ObjectDescription, write_table};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
 use surfel::names::{file_name, list_files};
@@ -250,12 +250,7 @@ fn all_files(startup: &SceneDescription) -> impl Iterator<Item = &PathBuf> {
 
 /// The folders of all files that a scene is made of.
 pub fn viewed_folders(startup: &SceneDescription, typed: &[PathBuf]) -> ViewedFolders {
-    let area = match &startup.objects_default.preparation.crop {
-        Some(Crop::File(file)) => Some(file),
-        _ => None,
-    };
-    let others = typed.iter().chain(&startup.light.environment).chain(area);
-    ViewedFolders::of(all_files(startup).chain(others).map(PathBuf::as_path))
+    ViewedFolders::of(startup.named_files().chain(typed).map(PathBuf::as_path))
 }
 
 /// Names of files without their folders, which a page need not know.

@@ -1,6 +1,7 @@
 //! Invalid options: exit code 2, whatever the file.
 
-use super::common::{Folder, dome, fail, stderr, succeed, surfel};
+use super::common::{Folder, dome, fail, light_picture, stderr, succeed, surfel};
+use std::fs;
 
 #[test]
 fn marks_that_the_camera_does_not_allow_are_named_by_their_options() {
@@ -11,6 +12,44 @@ fn marks_that_the_camera_does_not_allow_are_named_by_their_options() {
         let message = fail(&["render", &cloud, "-o", &picture, option], 2);
         assert!(message.contains(&format!("error: {option}: needs a camera")), "{message}");
     }
+}
+
+#[test]
+fn outputs_replace_no_inputs_and_no_other_outputs() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let sky = folder.write("sky.hdr", light_picture());
+    let png = folder.path("sky.png");
+    fs::rename(&sky, &png).unwrap();
+    let area = folder.write("area.tif", "POLYGON ((-1 -1, 1 -1, 1 1, -1 1, -1 -1))");
+    let (plan, heights) = (folder.path("plan.tif"), folder.path("h.tif"));
+    let scene = format!("environment = {png:?}\n[[object]]\nfile = {cloud:?}\ncrop = {area:?}");
+    let scene = folder.write("scene.toml", scene);
+    for arguments in [
+        &["render", &cloud, "--environment", &png, "-o", &png][..],
+        &["render", &scene, "-o", &area],
+        &["render", &scene, "-o", &plan, "--gsd", "0.1", "--height-map", &plan],
+        &["render", &scene, "-o", &plan, "--gsd", "0.1", "--height-map", &area],
+        &[
+            "render",
+            &scene,
+            "-o",
+            &plan,
+            "--gsd",
+            "0.1",
+            "--height-map",
+            &heights,
+            "--stats",
+            &heights,
+        ],
+        &["render", &scene, "-o", &plan, "--stats", &scene],
+        &["animate", &scene, "-o", &png, "--frames", "1"],
+        &["prepare", &cloud, "-o", &cloud],
+    ] {
+        let message = fail(arguments, 2);
+        assert!(message.contains("would replace that file"), "{arguments:?}: {message}");
+    }
+    assert_eq!(folder.names(), ["area.tif", "dome.ply", "scene.toml", "sky.png"]);
 }
 
 #[test]

@@ -326,7 +326,7 @@ fn info_and_prepare_reject_scene_files() {
     let folder = site();
     let scene = folder.write("scene.toml", "spp = 2\n[[object]]\nfile = \"a.ply\"");
     for arguments in [&["info", &scene][..], &["prepare", &scene, "-o", &folder.path("x.ply")]] {
-        let message = fail(arguments, 1);
+        let message = fail(arguments, 2);
         let expected = "scene.toml: is a scene file, which surfel render, animate and view take";
         assert!(message.contains(expected), "{message}");
     }

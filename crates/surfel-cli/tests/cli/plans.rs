@@ -185,7 +185,7 @@ fn what_cannot_be_a_plan_is_refused() {
         (&["--scale", "1:0"], 2, "as in 1:50"),
         (&["--height-map", &heights], 2, "add --gsd"),
         (&["--gsd", "0.1", "--surface", "points", "--height-map", &heights], 2, "needs a surface"),
-        (&["--gsd", "0.1", "--height-map", "heights.png"], 1, ".tif"),
+        (&["--gsd", "0.1", "--height-map", "heights.png"], 2, ".tif"),
     ] {
         let text = refused(options, code);
         assert!(text.contains(words), "{options:?}: {text}");

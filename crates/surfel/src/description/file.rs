@@ -1,8 +1,11 @@
 //! Scene files in TOML and JSON.
 
-use super::{Invalid, SceneDescription};
+use super::{Crop, Invalid, SceneDescription};
 use serde_json::{Map, Value};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The key of the table as which the parser of TOML hands over a date.
+const TOML_DATE: &str = "$__toml_private_datetime";
 
 /// Returns true if a path has the extension of a scene file, `.toml` or `.json`.
 pub fn is_scene_file(path: &Path) -> bool {
@@ -18,6 +21,21 @@ impl SceneDescription {
     /// Fails for unknown keys and wrong values, with their path.
     pub fn parse(text: &str, is_json: bool, folder: &Path) -> Result<Self, Invalid> {
         Self::from_table(&parse_table(text, is_json)?, folder)
+    }
+
+    /// Returns the files that the description names: those of points, meshes and scenes, environment maps, and areas whose
+    /// points are kept.
+    pub fn named_files(&self) -> impl Iterator<Item = &PathBuf> {
+        let of_objects = self.objects.iter().flat_map(|object| &object.files);
+        let settings = self.objects.iter().map(|object| &object.settings);
+        let areas = settings.chain([&self.objects_default]).filter_map(|settings| match &settings
+            .preparation
+            .crop
+        {
+            Some(Crop::File(path)) => Some(path),
+            _ => None,
+        });
+        self.files.iter().chain(of_objects).chain(&self.light.environment).chain(areas)
     }
 }
 
