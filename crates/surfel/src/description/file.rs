@@ -45,7 +45,7 @@ impl SceneDescription {
 ///
 /// Fails with line and column.
 pub fn parse_table(text: &str, is_json: bool) -> Result<Map<String, Value>, Invalid> {
-    let value: Value = if is_json {
+    let mut value: Value = if is_json {
         serde_json::from_str(text).map_err(|error| Invalid::new(error.to_string()))?
     } else {
         toml::from_str(text).map_err(|error| toml_error(text, &error))?
@@ -54,9 +54,24 @@ pub fn parse_table(text: &str, is_json: bool) -> Result<Map<String, Value>, Inva
     if !is_json && let Some(path) = path_of_null(&value) {
         return Err(Invalid::at(path, "found nan or inf, expected a number"));
     }
+    if !is_json {
+        dates_as_text(&mut value);
+    }
     match value {
         Value::Object(table) => Ok(table),
         _ => Err(Invalid::new("expected keys and values")),
+    }
+}
+
+/// Replaces dates of TOML, which its parser hands over as tables of one key, by their text.
+fn dates_as_text(value: &mut Value) {
+    match value {
+        Value::Object(table) if table.contains_key(TOML_DATE) => {
+            *value = table.remove(TOML_DATE).unwrap_or_default();
+        }
+        Value::Object(table) => table.values_mut().for_each(dates_as_text),
+        Value::Array(values) => values.iter_mut().for_each(dates_as_text),
+        _ => {}
     }
 }
 

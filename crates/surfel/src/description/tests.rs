@@ -188,6 +188,16 @@ fn options_over_a_scene_restore_defaults_that_it_changes() {
 }
 
 #[test]
+fn dates_of_toml_need_no_quotes() {
+    let date = |text: &str| parse(&format!("[sun]\ndate = {text}")).map(|scene| scene.sun.date);
+    let quoted = date("\"2026-06-21T15:00+02:00\"").unwrap();
+    assert_eq!(date("2026-06-21T15:00:00+02:00").unwrap(), quoted);
+    assert_eq!(date("2026-06-21 15:00:00+02:00").unwrap(), quoted);
+    let message = date("2026-06-21").unwrap_err().to_string();
+    assert!(message.contains("2026-06-21") && message.contains("offset from UTC"), "{message}");
+}
+
+#[test]
 fn a_named_device_demands_the_gpu() {
     let backend = |text: &str| parse(text).unwrap().run.chosen_backend();
     assert_eq!(backend("device = \"nvidia\""), Backend::Gpu);
