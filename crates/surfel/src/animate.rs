@@ -1,7 +1,7 @@
 //! Movies: one frame after another, with a turntable if one is asked for.
 
 use crate::built_scene::BuiltScene;
-use crate::description::{Crop, Invalid, SceneDescription};
+use crate::description::{Invalid, SceneDescription, ViewSettings};
 use crate::error::{Error, Result};
 use crate::memory_files::MemoryFiles;
 use crate::picture::{RenderedImage, image_options};
@@ -47,32 +47,22 @@ pub fn movie_options(description: &SceneDescription) -> MovieOptions {
 }
 
 /// Returns a text that changes with everything that frames depend on: the complete description, the sizes and times of
-/// all files, and the clouds and meshes in memory.
+/// all files, and the clouds and meshes in memory. Threads, memory limit, output file and saved views change no frame.
 pub fn fingerprint(
     complete: &SceneDescription,
     description: &SceneDescription,
     loaded: &LoadedScene,
 ) -> String {
-    let objects = description.objects.iter().flat_map(|object| &object.files);
     let external = loaded.file_infos.iter().flat_map(|info| &info.external_files);
-    let named = objects.chain(&description.light.environment).chain(external);
-    let files = description.files.iter().chain(named).chain(crop_files(description));
-    let files: BTreeSet<&PathBuf> = files.collect();
+    let files: BTreeSet<&PathBuf> = description.named_files().chain(external).collect();
     let stamps: Vec<_> = files.iter().map(|file| stamp(file, &description.memory)).collect();
-    let table = serde_json::Value::Object(complete.to_table());
+    let mut frames = complete.clone();
+    (frames.run.threads, frames.run.memory_limit, frames.output.output) = Default::default();
+    frames.views = ViewSettings::default();
+    let table = serde_json::Value::Object(frames.to_table());
     let text = format!("{} {table} {stamps:?}", env!("CARGO_PKG_VERSION"));
     let hash = text.bytes().fold(0, |hash, byte| surfel_core::math::hash(hash ^ u64::from(byte)));
     format!("{hash:016x}")
-}
-
-/// Returns the files of the areas whose points are kept.
-fn crop_files(description: &SceneDescription) -> impl Iterator<Item = &PathBuf> {
-    let of_objects = description.objects.iter().map(|object| &object.settings);
-    let all = of_objects.chain([&description.objects_default]);
-    all.filter_map(|settings| match &settings.preparation.crop {
-        Some(Crop::File(path)) => Some(path),
-        _ => None,
-    })
 }
 
 /// Returns a text that changes with the content of a file; `None` if it cannot be read.
@@ -113,6 +103,8 @@ impl PlannedMovie {
         options.n_frames = frame_count(&description, loaded.duration_secs())?;
         let auto = AutoSettings::choose(&loaded, &description, progress)?;
         let mut complete = auto.complete_description(&loaded);
+        // The pixels of a plan are chosen from the data.
+        (options.width, options.height) = complete.picture.resolution();
         complete.output.frames = Some(options.n_frames);
         complete.output.fps = Some(options.fps);
         Ok(Self { loaded, complete, description, auto, options })
@@ -271,6 +263,7 @@ mod tests {
     //! Frames of other data have another fingerprint.
 
     use super::*;
+    use crate::description::Crop;
     use crate::memory_files::MemoryContent;
     use std::sync::Arc;
     use surfel_core::math::Vec3;
@@ -297,6 +290,22 @@ mod tests {
     fn the_fingerprint_changes_with_points_in_memory() {
         assert_eq!(fingerprint_of(&square(7)), fingerprint_of(&square(7)));
         assert_ne!(fingerprint_of(&square(7)), fingerprint_of(&square(8)));
+    }
+
+    #[test]
+    fn the_fingerprint_is_that_of_frames_alone() {
+        let fingerprint_with = |key: &str, value: &str| {
+            let mut description = square(7);
+            description.set(key, &value.into(), Path::new("")).unwrap();
+            fingerprint_of(&description)
+        };
+        let plain = fingerprint_of(&square(7));
+        for (key, value) in [("threads", "1"), ("memory_limit", "2G"), ("output", "./movie.gif")] {
+            assert_eq!(fingerprint_with(key, value), plain, "{key}");
+        }
+        for (key, value) in [("backend", "gpu"), ("spp", "5"), ("fps", "3")] {
+            assert_ne!(fingerprint_with(key, value), plain, "{key}");
+        }
     }
 
     #[test]

@@ -234,3 +234,17 @@ fn a_plan_that_does_not_fit_into_memory_is_refused_before_the_work() {
     let text = fail(&[&["render", &cloud, "-o", &picture], &plan[..]].concat(), 1);
     assert!(text.contains("--memory-limit"), "{text}");
 }
+
+#[test]
+fn a_movie_of_a_plan_has_the_pixels_of_the_plan() {
+    let folder = Folder::new();
+    folder.write("floor.csv", floor());
+    let scene =
+        folder.write("scene.toml", "gsd = 0.2\nspp = 1\n[[object]]\nfile = \"floor.csv\"\n");
+    let (movie, picture) = (folder.path("movie.png"), folder.path("plan.png"));
+    succeed(&["animate", &scene, "-o", &movie, "--frames", "2"]);
+    succeed(&["render", &scene, "-o", &picture]);
+    let (frame, plan) = (read_png(movie), read_png(picture));
+    assert_eq!((frame.0, frame.1), (plan.0, plan.1));
+    assert!(29 <= frame.0 && frame.0 <= 34, "{} pixels", frame.0);
+}
