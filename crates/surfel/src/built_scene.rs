@@ -7,7 +7,9 @@ use crate::overlay::Overlay;
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::{CancelOnly, Choice};
 use crate::renderer::SceneRenderer;
-use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
+use crate::resolve::{
+    Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps, expose_materials,
+};
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::{DQuat, Vec3};
 use surfel_core::progress::{NoProgress, Progress};
@@ -179,6 +181,7 @@ impl BuiltScene {
                 self.flat.replace(geometry_idx, &self.graph.geometries[geometry_idx], progress)?;
             }
             self.flat.materials.clone_from(&self.graph.materials);
+            expose_materials(&mut self.flat.materials, self.stops);
             self.flat.textures.clone_from(&self.graph.textures);
             progress.end();
         }

@@ -92,6 +92,22 @@ fn each_frame_of_a_sequence_is_the_picture_of_its_file() {
 }
 
 #[test]
+fn emissive_materials_keep_their_brightness_through_a_sequence() {
+    let folder = Folder::new();
+    for name in ["a.ply", "b.ply"] {
+        folder.write(name, tile(1.0, 0.0, [120; 3]));
+    }
+    let scene = "exposure = -1\nlight = \"sun\"\nup = \"+Z\"\n\
+                 [[object]]\nfiles = [\"a.ply\", \"b.ply\"]\nfps = 2\n\
+                 material = { emissive = \"#808080\" }\n";
+    let scene = folder.write("scene.toml", scene);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
+    let (frames, _) = read_apng(&path);
+    assert!(frames.len() == 2 && frames[0] == frames[1]);
+}
+
+#[test]
 fn one_mesh_of_a_sequence_is_in_memory_at_a_time() {
     let folder = site();
     let scene = "[[object]]\nfiles = [\"f1.obj\", \"f2.obj\", \"f5.obj\"]\nfps = 1\n";

@@ -42,7 +42,7 @@ pub(crate) use plan::height_map_place;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
 pub use station::{LocatedStation, located_stations};
-pub(crate) use sun_and_sky::{expose, expose_lamps};
+pub(crate) use sun_and_sky::{expose, expose_lamps, expose_materials};
 
 use crate::crs::{CoordinateSystem, Unit, georeference};
 use crate::description::{CameraSettings, LightKind, OrthographicHeight, SceneDescription};

@@ -7,7 +7,7 @@ use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, Environment, InsideView, Light, Sky, Sun, sunlit_fraction, visible_normals,
+    Camera, Environment, InsideView, Light, Material, Sky, Sun, sunlit_fraction, visible_normals,
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::words::format_length;
@@ -153,15 +153,20 @@ pub fn expose(scene: &mut FlatScene, stops: f32) {
         }
     }
     expose_lamps(&mut scene.punctual_lights, stops);
-    scene.materials.iter_mut().for_each(|material| {
-        material.emissive *= gain;
-        material.emissive_strength *= gain;
-    });
+    expose_materials(&mut scene.materials, stops);
 }
 
 /// Makes lamps brighter by stops, after the animation has set them again.
 pub fn expose_lamps(lamps: &mut [FlatPunctualLight], stops: f32) {
     lamps.iter_mut().for_each(|lamp| lamp.color *= stops.exp2());
+}
+
+/// Makes emissive materials brighter by stops, after a sequence has set them again.
+pub fn expose_materials(materials: &mut [Material], stops: f32) {
+    materials.iter_mut().for_each(|material| {
+        material.emissive *= stops.exp2();
+        material.emissive_strength *= stops.exp2();
+    });
 }
 
 fn choose_sun(settings: &mut SunSettings, context: &LightingContext, progress: &dyn Progress) {
