@@ -57,6 +57,26 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
         let found = render(&ply, options);
         assert!(found.len() == 1 && found[0].contains(expected), "{options:?}: {found:?}");
     }
+    for (options, ends) in [
+        (&["--point-size", "8"][..], "points [--point-size, --surface]"),
+        (&["--reach", "3"], "splat-fit [--reach, --surface]"),
+        (&["--density", "3", "--surface", "disc"], "cylinder [--density, --surface]"),
+        (&["--cmap", "turbo"], "[--cmap, --color]"),
+        (&["--cmap", "turbo", "--range", "0,1", "--color", "red"], "[--cmap, --range, --color]"),
+        (&["--light", "none", "--sun-elevation", "10"], "no sun shines [--sun-elevation, --light]"),
+        (&["--light", "sun", "--sky-strength", "2"], "no sky shines [--sky-strength, --light]"),
+    ] {
+        let found = render(&ply, options);
+        assert!(found.len() == 1 && found[0].ends_with(ends), "{options:?}: {found:?}");
+    }
+    for options in [
+        &["--point-size", "8", "--surface", "points"][..],
+        &["--reach", "3", "--surface", "mls"],
+        &["--cmap", "turbo", "--range", "0,1", "--color", "elevation"],
+        &["--sun-elevation", "10", "--sky-strength", "2"],
+    ] {
+        assert_eq!(render(&ply, options), [""; 0], "{options:?}");
+    }
     let columns = ["--columns", "x,y,z,red,green,blue,class,rain"];
     assert_eq!(render(&text, &columns), [""; 0]);
     assert_eq!(render(&ply, &["--surface", "points", "--material", "unlit"]), [""; 0]);

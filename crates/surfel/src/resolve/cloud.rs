@@ -284,7 +284,7 @@ pub fn state_known_sides(geometry: &mut CloudGeometry, settings: &PreparationSet
 }
 
 /// Returns the surface of a cloud: that of the settings, or what suits its columns.
-fn surface_of(cloud: &PointCloud, settings: &ObjectSettings) -> SurfaceKind {
+pub(super) fn surface_of(cloud: &PointCloud, settings: &ObjectSettings) -> SurfaceKind {
     match settings.surface.surface {
         None if cloud.has_gaussians() => SurfaceKind::Gaussian,
         _ => settings.surface.surface(),

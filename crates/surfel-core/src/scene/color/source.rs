@@ -54,6 +54,11 @@ impl ColorSource {
         matches!(self, Self::Elevation | Self::Normal | Self::Support)
     }
 
+    /// True if a colour map turns the values of the source into colours.
+    pub fn is_mapped(&self) -> bool {
+        !matches!(self, Self::Rgb | Self::Class | Self::Normal | Self::Constant(_))
+    }
+
     /// True if the values of the source are names of things rather than amounts, so that no value lies between two
     /// others: classes and whole numbers.
     pub fn is_categorical(&self, cloud: &PointCloud) -> bool {

@@ -1,10 +1,16 @@
 //! Warnings of settings that change nothing in the scene or in the file of its picture.
 
+use super::super::cloud::surface_of;
 use super::LoadedScene;
-use crate::description::{PreparationSettings, SceneDescription, misspelled};
+use crate::description::{
+    ColorSettings, KeyedSettings, LightKind, PreparationSettings, SceneDescription,
+    SurfaceSettings, misspelled, write_table,
+};
 use surfel_core::progress::Progress;
 use surfel_core::render::MIN_ADAPTIVE_SAMPLES;
 use surfel_core::scene::Background;
+use surfel_core::scene::color::{ColorSource, choose_source};
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::{BitDepth, FileInfo, TextColumn};
 
 impl LoadedScene {
@@ -23,6 +29,61 @@ impl LoadedScene {
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
         self.report_unused_of_points(description, progress);
+        self.report_unused_of_surfaces(description, progress);
+        report_unused_of_lights(description, progress);
+    }
+
+    /// Warns of settings of surfaces and colours that no cloud has a use for.
+    fn report_unused_of_surfaces(&self, description: &SceneDescription, progress: &dyn Progress) {
+        if self.graph.geometries.is_empty() {
+            return;
+        }
+        let clouds = self.clouds().map(|(i, cloud)| (self.settings_of(i, description), cloud));
+        let (surfaces, sources): (Vec<SurfaceKind>, Vec<ColorSource>) = clouds
+            .map(|(settings, cloud)| {
+                let source = || choose_source(cloud).0;
+                let surface = surface_of(cloud, &settings);
+                (surface, settings.color.color.unwrap_or_else(source))
+            })
+            .unzip();
+        let SurfaceSettings { reach, density, degree, octree_depth, .. } =
+            &description.objects_default.surface;
+        let is_octree =
+            |kind: &SurfaceKind| [SurfaceKind::Octree, SurfaceKind::OctreeSplat].contains(kind);
+        let has = |kind: SurfaceKind| surfaces.contains(&kind);
+        for (key, is_unused, kinds) in [
+            (
+                "point_size",
+                description.picture.point_size.is_some() && !has(SurfaceKind::Points),
+                "points",
+            ),
+            (
+                "reach",
+                reach.is_some() && !surfaces.iter().any(|kind| kind.has_reach()),
+                "cylinder, mls and splat-fit",
+            ),
+            ("density", density.is_some() && !has(SurfaceKind::Cylinder), "cylinder"),
+            ("degree", degree.is_some() && !has(SurfaceKind::Mls), "mls"),
+            (
+                "octree_depth",
+                octree_depth.is_some() && !surfaces.iter().any(is_octree),
+                "octree and octree-splat",
+            ),
+        ] {
+            if is_unused {
+                let line = format!("warning: no effect: only for the surface {kinds}");
+                progress.choice(&line, &[key, "surface"]);
+            }
+        }
+        let ColorSettings { cmap, range, .. } = &description.objects_default.color;
+        let set = [("cmap", cmap.is_some()), ("range", range.is_some())];
+        let mut keys: Vec<&str> =
+            set.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
+        if !keys.is_empty() && !sources.iter().any(ColorSource::is_mapped) {
+            keys.push("color");
+            let line = "warning: no effect: maps colour values, as elevation, intensity and columns have them";
+            progress.choice(line, &keys);
+        }
     }
 
     /// Warns of settings that choose or colour points in a scene without points.
@@ -45,6 +106,23 @@ impl LoadedScene {
                         materials and vertices";
             progress.choice(line, &keys);
         }
+    }
+}
+
+/// Warns of settings of lights that do not shine.
+fn report_unused_of_lights(description: &SceneDescription, progress: &dyn Progress) {
+    let lights: [(LightKind, &str, &dyn KeyedSettings); 2] =
+        [(LightKind::Sun, "sun", &description.sun), (LightKind::Sky, "sky", &description.sky)];
+    for (kind, name, settings) in lights {
+        let names = write_table(settings);
+        // Where the sun would be placed, its date is reported.
+        let names = names.keys().filter(|key| *key != "date");
+        let paths: Vec<String> = names.map(|key| format!("{name}.{key}")).collect();
+        if description.light.has(kind) || paths.is_empty() {
+            continue;
+        }
+        let keys: Vec<&str> = paths.iter().map(String::as_str).chain(["light"]).collect();
+        progress.choice(&format!("warning: no effect: no {name} shines"), &keys);
     }
 }
 
