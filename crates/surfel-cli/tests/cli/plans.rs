@@ -248,3 +248,33 @@ fn a_movie_of_a_plan_has_the_pixels_of_the_plan() {
     assert_eq!((frame.0, frame.1), (plan.0, plan.1));
     assert!(29 <= frame.0 && frame.0 <= 34, "{} pixels", frame.0);
 }
+
+#[test]
+fn the_stated_system_of_degrees_is_that_of_the_file() {
+    let folder = Folder::new();
+    let point = |n: usize| {
+        let (i, j) = (n % 40, n / 40);
+        let [x, y] = [11.57 + 2e-6 * i as f64, 48.13 + 2e-6 * j as f64];
+        format!("{x:.7} {y:.7} {:.2}\n", 520.0 + 0.01 * (i * j) as f64)
+    };
+    let cloud = folder.write("degrees.xyz", (0..1600).map(point).collect::<String>());
+    let focal_point = |crs: &[&str]| {
+        let options = ["--gsd", "0.05", "--sun", "2026-06-21T15:00+02:00", "--dry-run"];
+        let text = succeed(&[&["render", &cloud], &options[..], crs].concat());
+        let scene: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let azimuth = scene["sun"]["azimuth"].as_f64().unwrap();
+        (scene["camera"]["focal_point"][0].as_f64().unwrap(), azimuth)
+    };
+    // The meridian of zone 32 lies 2.57 degrees to the west, that of zone 33 3.43 degrees to the east.
+    let (x, azimuth) = focal_point(&["--crs", "EPSG:4326"]);
+    assert!((focal_point(&["--crs", "EPSG:25832"]).0 - x).abs() < 0.1);
+    let (x_of_33, azimuth_of_33) = focal_point(&["--crs", "EPSG:25833"]);
+    assert!((691_000.0..692_000.0).contains(&x) && (244_000.0..246_000.0).contains(&x_of_33));
+    // Grid north of both zones differs by 4.5 degrees.
+    assert!((azimuth_of_33 - azimuth - 4.5).abs() < 0.3, "{azimuth} {azimuth_of_33}");
+    let picture = folder.path("plan.png");
+    let plan = ["--gsd", "0.05", "--crs", "EPSG:25833", "--spp", "1"];
+    succeed(&[&["render", &cloud, "-o", &picture], &plan[..]].concat());
+    let [.., left, _] = world_file(&folder.path("plan.pgw"));
+    assert!((244_000.0..246_000.0).contains(&left), "{left}");
+}

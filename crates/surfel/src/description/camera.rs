@@ -83,7 +83,8 @@ settings! {
         /// Axis that points up: +Z, -Y or x,y,z [default: found from the data].
         up: Vec3, Axis, "AXIS", common;
         /// Coordinate reference system of the coordinates, as in EPSG:25832 [default: that of the files]. It tells the
-        /// unit, and where the sun of --sun stands.
+        /// unit, and where the sun of --sun stands. Files in degrees are moved to it; EPSG:4326 states that coordinates
+        /// are degrees.
         crs: String, CrsRule, "CRS";
         /// Latitude and longitude in degrees, for the sun of --sun [default: by the coordinate system].
         place: Place, PlaceRule, "LAT,LON";
@@ -141,7 +142,6 @@ impl CameraSettings {
         is_neutral && set == free
     }
 
-    /// Returns true for an equirectangular picture all around.
     /// Returns the key that states a direction of view, if one is set.
     fn direction_key(&self) -> Option<&'static str> {
         let is_set = [
@@ -191,6 +191,7 @@ impl CameraSettings {
         self.direction_key().map_or(Ok(()), |key| Err(Invalid::at(key, text)))
     }
 
+    /// Returns true for an equirectangular picture all around.
     pub fn is_panorama(&self) -> bool {
         self.panorama == Some(true)
     }

@@ -34,6 +34,8 @@ pub struct ImportOptions {
     pub memory: MemoryFiles,
     /// Coordinate system of a file that was read before, to which degrees are moved.
     pub coordinate_system: Option<String>,
+    /// Coordinate system of the description: that of coordinates in degrees, or the one to which they are moved.
+    pub crs: Option<String>,
 }
 
 /// Reads what a file holds.
@@ -95,7 +97,14 @@ fn with_metres(
     progress: &dyn Progress,
 ) -> (Graph<PointCloud>, FileInfo) {
     if let [Geometry::Points(cloud)] = &mut graph.geometries[..] {
-        move_to_metres(cloud, &mut info, options.coordinate_system.as_deref(), progress);
+        let mut target = options.coordinate_system.as_deref();
+        match &options.crs {
+            Some(crs) if is_in_degrees(cloud, Some(crs)) => {
+                info.coordinate_system = Some(crs.clone());
+            }
+            crs => target = crs.as_deref().or(target),
+        }
+        move_to_metres(cloud, &mut info, target, progress);
     }
     (graph, info)
 }

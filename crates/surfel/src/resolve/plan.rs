@@ -13,13 +13,18 @@ use surfel_core::scene::{Camera, Projection, default_view_up};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::Georeference;
 
-/// Returns the coordinate system of a scene: that of the description, or the one that its files share.
+/// Returns the coordinate system of a scene: that of the description, or the one that its files share. Files whose degrees
+/// were moved have that of their metres.
 pub fn coordinate_system(
     scene: &LoadedScene,
     description: &SceneDescription,
 ) -> Option<CoordinateSystem> {
-    let stated = description.world.crs.clone().or_else(|| scene.file_info().coordinate_system);
-    CoordinateSystem::parse(&stated?)
+    let of_files = || CoordinateSystem::parse(&scene.file_info().coordinate_system?);
+    let stated = description.world.crs.as_deref().and_then(CoordinateSystem::parse);
+    match stated {
+        Some(degrees) if degrees.unit() == Unit::Degrees => of_files().or(Some(degrees)),
+        stated => stated.or_else(of_files),
+    }
 }
 
 /// Writes the camera and the resolution of a plan into a description that asks for one.

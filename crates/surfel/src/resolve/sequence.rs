@@ -90,8 +90,9 @@ impl Sequence {
         Self { files, fps, settings, options, slots, world_from_file, shown_at, is_dark, file_idx }
     }
 
-    /// Returns the sequence with its first file shown under other settings.
+    /// Returns the sequence with its first file shown under other settings. Its coordinates stay where they were moved.
     pub fn under(&self, settings: ObjectSettings, options: ImportOptions) -> Self {
+        let options = ImportOptions { crs: self.options.crs.clone(), ..options };
         Self::new(self.files.clone(), self.fps, settings, options, self.slots.clone())
     }
 

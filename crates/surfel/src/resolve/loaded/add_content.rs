@@ -31,6 +31,7 @@ impl LoadedScene {
                 .file_infos
                 .iter()
                 .find_map(|info| info.coordinate_system.clone()),
+            crs: description.world.crs.clone(),
         }
     }
 
