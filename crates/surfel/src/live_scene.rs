@@ -13,7 +13,7 @@ use crate::point_overlap::check_overlap;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, common_legend, coordinate_system,
-    expose, finish_graph, hide_walls, render_settings,
+    expose, finish_graph, hide_walls, render_settings, with_common_ranges,
 };
 use crate::scene_keys::{filter_key, grouping_key, preparation_key, tree_key};
 use crate::thread_pools::{lower_priority, start_threads};
@@ -421,10 +421,11 @@ impl TreeSource<'_> {
     ) -> Result<SceneTrees> {
         let Self { loaded, time_secs, description, auto, use_case } = self;
         let up = auto.up;
-        let legend = common_legend(loaded, &clouds, description, up);
+        let description = with_common_ranges(loaded, &clouds, description, up, progress);
+        let legend = common_legend(loaded, &clouds, &description, up);
         let raw = loaded.graph_without_points();
         let (mut graph, mut sequences) =
-            finish_graph(loaded, raw, clouds, description, up, progress)?;
+            finish_graph(loaded, raw, clouds, &description, up, progress)?;
         hide_walls(&mut graph, &auto.hidden_walls);
         for sequence in &mut sequences {
             sequence.seek(time_secs, &mut graph, up, progress)?;

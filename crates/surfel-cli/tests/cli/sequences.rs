@@ -1,7 +1,7 @@
 //! Sequences of meshes: each frame equals the picture of its file, whatever the parts of the files.
 
 use super::animate::{movie, read_apng, read_shot};
-use super::common::{Folder, SMALL, dome, fail, succeed, tile};
+use super::common::{Folder, SMALL, dome, fail, stderr, succeed, surfel, tile};
 use std::fs;
 
 /// Returns squares side by side as OBJ, each with its own material.
@@ -105,6 +105,27 @@ fn emissive_materials_keep_their_brightness_through_a_sequence() {
     movie(&[&scene, "-o", &path, "--fps", "2"]);
     let (frames, _) = read_apng(&path);
     assert!(frames.len() == 2 && frames[0] == frames[1]);
+}
+
+#[test]
+fn one_range_of_values_colors_all_files_of_a_sequence() {
+    let folder = Folder::new();
+    // The second file is the first one, raised by 1.
+    for (name, height) in [("a.xyz", 0.0), ("b.xyz", 1.0)] {
+        let point =
+            |n: usize| format!("{} {} {}\n", n % 20, n / 20, height + 0.1 * (n % 20) as f64);
+        folder.write(name, (0..400).map(point).collect::<String>());
+    }
+    let scene = "light = \"none\"\ncolor = \"elevation\"\nlegend = true\nup = \"+Z\"\n\
+                 [camera]\ndirection = [0, 0, -1]\northographic = 10\n\
+                 [[object]]\nfiles = [\"a.xyz\", \"b.xyz\"]\nfps = 2\n";
+    let scene = folder.write("scene.toml", scene);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
+    let (frames, _) = read_apng(&path);
+    assert!(frames.len() == 2 && frames[0] != frames[1]);
+    let text = stderr(&surfel(&[&["render", &scene, "-o", &path], &SMALL[..]].concat()));
+    assert!(text.contains("color elevation from 0.0"), "{text}");
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod appearance;
 mod sequence;
 mod check_files;
 mod loaded;
+mod common_range;
 mod common_legend;
 mod plan;
 mod sun_position;
@@ -32,6 +33,7 @@ pub use cloud::{
     report_radii, state_known_sides,
 };
 pub(crate) use common_legend::common_legend;
+pub(crate) use common_range::with_common_ranges;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub(crate) use loaded::report_unused_of_files;
@@ -210,6 +212,7 @@ impl LoadedScene {
         let AutoSettings { up, camera, lights, description, hidden_walls, turned_room } = auto;
         check_camera(&description, &camera.at(0.0, &self.graph), up)?;
         let clouds = self.take_prepared(&description, progress)?;
+        let description = with_common_ranges(&self, &clouds, &description, up, progress);
         let legend = match description.picture.legend() {
             true => common_legend(&self, &clouds, &description, up),
             false => Legend::None,

@@ -36,14 +36,7 @@ impl<'c> Mapping<'c> {
         let given = coloring.range.map(|(low, high)| PercentileRange { low, high });
         let (range, range_origin) = match given {
             Some(given) => (given, "as given"),
-            None if *source == ColorSource::Support => {
-                (DEFAULT_RANGE, "at a point to one radius away from all points")
-            }
-            None if *source == ColorSource::Column(STRUCTURE.into()) => {
-                let (range, _) = automatic_range(cloud.len(), &value_at);
-                (range, "0 surface, 1 line, 2 scatter, 3 not drawn")
-            }
-            None => automatic_range(cloud.len(), &value_at),
+            None => source.automatic_range(cloud.len(), &value_at),
         };
         let map = coloring.colormap.unwrap_or(source.default_colormap());
         let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
@@ -84,6 +77,33 @@ fn automatic_range(
     }
 }
 
+/// Returns the range of the values of several clouds that are coloured alike, and a line about it; `None` if it is given, and
+/// if the source or a cloud has no values.
+pub fn common_range(
+    clouds: &[&PointCloud],
+    coloring: &Coloring,
+    source: &ColorSource,
+) -> Option<((f64, f64), String)> {
+    if coloring.range.is_some() {
+        return None;
+    }
+    let values = clouds.iter().map(|cloud| Some((cloud.len(), source.values(cloud, coloring)?)));
+    let values = values.collect::<Option<Vec<_>>>()?;
+    let value_at = |i: usize| {
+        let mut i = i;
+        let of_point = values.iter().find_map(|(n_points, value_at)| {
+            let found = (i < *n_points).then(|| value_at(i));
+            i = i.saturating_sub(*n_points);
+            found
+        });
+        of_point.unwrap_or(f64::NAN)
+    };
+    let n_values = values.iter().map(|(n_points, _)| n_points).sum();
+    let (range, range_origin) = source.automatic_range(n_values, value_at);
+    let line = format!("color {source} from {} ({range_origin})", format_range(range));
+    Some(((range.low, range.high), line))
+}
+
 /// Formats both ends with enough digits to resolve a thousandth of the range.
 fn format_range(PercentileRange { low, high }: PercentileRange) -> String {
     let size = (high - low).abs().log10();
@@ -95,6 +115,22 @@ impl ColorSource {
     /// Returns the map that is used if none is named.
     pub(super) fn default_colormap(&self) -> Colormap {
         if *self == Self::Intensity { Colormap::GRAY } else { Colormap::VIRIDIS }
+    }
+
+    /// Returns the range of values that is not given, and its origin.
+    fn automatic_range(
+        &self,
+        n_values: usize,
+        value_at: impl Fn(usize) -> f64,
+    ) -> (PercentileRange, &'static str) {
+        match self {
+            Self::Support => (DEFAULT_RANGE, "at a point to one radius away from all points"),
+            Self::Column(name) if name == STRUCTURE => {
+                let (range, _) = automatic_range(n_values, value_at);
+                (range, "0 surface, 1 line, 2 scatter, 3 not drawn")
+            }
+            _ => automatic_range(n_values, value_at),
+        }
     }
 
     /// Returns the value of each point, or `None` if the source has no values or `cloud` lacks its column.

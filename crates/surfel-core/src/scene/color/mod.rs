@@ -11,6 +11,7 @@ mod legend;
 pub use choose::choose_source;
 pub use coloring::Coloring;
 pub use legend::{Legend, legend};
+pub use mapping::common_range;
 pub use source::{ColorSource, parse_hex};
 pub use support::SupportColors;
 
@@ -180,6 +181,21 @@ mod tests {
             ..coloring(Some("deviation"))
         };
         assert_eq!(colorize(&cloud, &range, &NoProgress).unwrap()[2000], [51; 3]);
+    }
+
+    #[test]
+    fn the_range_of_several_clouds_is_that_of_all_their_values() {
+        let low = lattice();
+        let high = PointCloud { origin: crate::math::DVec3::new(0.0, 0.0, 2500.0), ..lattice() };
+        let coloring = coloring(Some("elevation"));
+        let of = |clouds: &[&PointCloud]| common_range(clouds, &coloring, &ColorSource::Elevation);
+        let (range, line) = of(&[&low, &high]).unwrap();
+        assert_eq!(range, (100.0, 4899.0));
+        assert!(line.starts_with("color elevation from 100 to 4899 ("), "{line}");
+        assert_eq!(of(&[&low]).unwrap().0, (50.0, 2449.0));
+        let given = Coloring { range: Some((0.0, 1.0)), ..coloring.clone() };
+        assert_eq!(common_range(&[&low], &given, &ColorSource::Elevation), None);
+        assert_eq!(common_range(&[&low], &coloring, &ColorSource::Rgb), None);
     }
 
     #[test]

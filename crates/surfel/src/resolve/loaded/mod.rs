@@ -305,6 +305,11 @@ impl LoadedScene {
         }
     }
 
+    /// Returns the index of the object of a geometry; none for files without an object.
+    pub(super) fn owner(&self, geometry: usize) -> Option<usize> {
+        self.owners[geometry]
+    }
+
     /// Returns true if a cloud has normals, those of its file or those that its settings need.
     pub(super) fn has_normals(&self, description: &SceneDescription) -> bool {
         let is_wanted = |i| self.settings_of(i, description).needs_normals();
