@@ -278,3 +278,31 @@ fn the_stated_system_of_degrees_is_that_of_the_file() {
     let [.., left, _] = world_file(&folder.path("plan.pgw"));
     assert!((244_000.0..246_000.0).contains(&left), "{left}");
 }
+
+#[test]
+fn points_beside_a_plan_are_reported_with_the_plan_that_shows_them() {
+    let folder = Folder::new();
+    let shed = (0..20).map(|i| {
+        let [x, y] = [MARKER[0] + 30.0 + 0.05 * f64::from(i), MARKER[1]];
+        format!("{x:.3},{y:.3},{ELEVATION},128,128,128\n")
+    });
+    let cloud = folder.write("site.csv", floor() + &shed.collect::<String>());
+    let dry = |options: &[&str]| {
+        surfel(&[&["render", &cloud, "--gsd", "0.1", "--dry-run"], options].concat())
+    };
+    let text = stderr(&dry(&[]));
+    let warning = text.lines().find(|line| line.starts_with("warning: ")).unwrap_or_default();
+    assert!(warning.contains("20 points outside of the plan, up to 27.9 m away"), "{text}");
+    assert!(warning.ends_with("[--resolution, --camera-focal-point]"), "{text}");
+    let words: Vec<&str> = warning.split(' ').collect();
+    let word_before =
+        |word: &str| words[words.iter().position(|other| *other == word).unwrap() - 1];
+    let (size, middle) = (word_before("pixels"), word_before("show"));
+    let output = dry(&["--resolution", size, "--camera-focal-point", middle]);
+    assert!(!stderr(&output).contains("outside of the plan"), "{}", stderr(&output));
+    let scene: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let width: f64 = size.split('x').next().unwrap().parse().unwrap();
+    let x = scene["camera"]["focal_point"][0].as_f64().unwrap();
+    let [low, high] = [x - 0.05 * width, x + 0.05 * width];
+    assert!(low <= MARKER[0] - 2.99 && MARKER[0] + 30.95 <= high, "{low} {high}");
+}

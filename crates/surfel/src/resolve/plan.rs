@@ -11,6 +11,7 @@ use surfel_core::progress::Progress;
 use surfel_core::render::MAX_PIXELS;
 use surfel_core::scene::{Camera, Projection, default_view_up};
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::counted;
 use surfel_formats::Georeference;
 
 /// Returns the coordinate system of a scene: that of the description, or the one that its files share. Files whose degrees
@@ -66,6 +67,12 @@ pub fn frame_plan(
     let side = six_digits(pixel_size);
     let line = format!("plan of {width}x{height} pixels, each {side} {} wide", unit.symbol());
     progress.choice(&line, &["gsd", "scale", "resolution"]);
+    if description.picture.resolution.is_none()
+        && let Some(outside) = window.points_outside(&camera, points)
+    {
+        let line = outside.warning(unit.symbol());
+        progress.choice(&line, &["resolution", "camera.focal_point"]);
+    }
     description.picture.resolution = Some((width, height));
     description.camera = window.camera_settings(&description.camera, &camera);
     scene.check_memory(description)
@@ -173,6 +180,32 @@ impl Window {
         is_possible.then_some((width as u32, height as u32))
     }
 
+    /// Returns what is known of the points that the window does not show, if there are any.
+    fn points_outside(&self, camera: &Camera, points: &PointCloud) -> Option<PointsOutside> {
+        let [right, up, _] = camera.axes();
+        let start = [right, up].map(|axis| axis.dot(points.origin));
+        let (low, high) =
+            ([self.left, self.top - self.size[1]], [self.left + self.size[0], self.top]);
+        let distance = |point: &Vec3| {
+            let beyond = |i: usize, axis: DVec3| {
+                let at = start[i] + axis.dot(point.as_dvec3());
+                (self.pixel_size * low[i] - at).max(at - self.pixel_size * high[i]).max(0.0)
+            };
+            beyond(0, right).max(beyond(1, up))
+        };
+        let valid = points.positions.iter().copied().filter(|point| is_valid_position(*point));
+        let bounds = Aabb::of_points(valid.clone());
+        let beyond =
+            valid.map(|point| distance(&point)).filter(|distance| self.pixel_size < *distance);
+        let (n_points, distance) = beyond.fold((0, 0.0), |(n_points, farthest), distance| {
+            (n_points + 1, distance.max(farthest))
+        });
+        let whole = Self::around(camera, (points, bounds), self.pixel_size);
+        let middle = whole.camera_settings(&CameraSettings::default(), camera).focal_point?;
+        let (size, pixel_size) = (whole.size, self.pixel_size);
+        (0 < n_points).then_some(PointsOutside { n_points, distance, size, middle, pixel_size })
+    }
+
     /// Returns the settings of a camera that shows the window.
     fn camera_settings(&self, settings: &CameraSettings, camera: &Camera) -> CameraSettings {
         let [right, up, _] = camera.axes();
@@ -192,6 +225,33 @@ impl Window {
             interior: settings.interior,
             ..CameraSettings::default()
         }
+    }
+}
+
+/// Points that a plan does not show, since they lie apart from all others, and the plan that would show all points.
+struct PointsOutside {
+    n_points: usize,
+    /// Greatest distance from the plan.
+    distance: f64,
+    /// Width and height of the plan of all points in pixels.
+    size: [f64; 2],
+    /// Middle of the plan of all points.
+    middle: DVec3,
+    pixel_size: f64,
+}
+
+impl PointsOutside {
+    /// Returns a line for the user.
+    fn warning(&self, unit: &str) -> String {
+        let Self { n_points, distance, size: [width, height], middle, pixel_size } = self;
+        let points = counted(*n_points, "point");
+        // As exact as a tenth of a pixel.
+        let n_decimals = (1.0 - pixel_size.log10()).ceil().clamp(0.0, 12.0) as usize;
+        let [x, y, z] = middle.to_array().map(|x| format!("{x:.n_decimals$}"));
+        format!(
+            "warning: {points} outside of the plan, up to {distance:.1} {unit} away; {width:.0}x{height:.0} pixels \
+             about {x},{y},{z} show all"
+        )
     }
 }
 
