@@ -4,12 +4,14 @@ use serde_json::{Value, json};
 use std::env;
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Read, Write};
-use std::path::absolute;
+use std::path::{Path, absolute};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 use surfel::animate::AddFrame;
+use surfel::description::ObjectOverride;
+use surfel::description::rule::absolute_text;
 use surfel::{Error, Result, SceneDescription};
 use surfel_core::progress::Progress;
 
@@ -61,10 +63,25 @@ fn job(
     let path = |file| absolute(file).map(|path| path.display().to_string());
     let files = description.files.iter().map(path).collect::<io::Result<Vec<String>>>();
     let files = files.map_err(|error| Error::Unfit(format!("the folder is unknown: {error}")))?;
-    let scene = Value::Object(description.to_table()).to_string();
+    let scene = Value::Object(for_other_folders(description).to_table()).to_string();
     Ok(json!({
         "address": address, "files": files, "scene": scene, "frames": frames, "format": format,
     }))
+}
+
+/// Returns a description, whose settings by name are applied, as programs in other folders read it: materials and labels
+/// name files by their absolute paths.
+fn for_other_folders(description: &SceneDescription) -> SceneDescription {
+    let mut sent = description.clone();
+    if let Some(all) = &mut sent.overrides.object_settings {
+        all.retain(ObjectOverride::is_label);
+    }
+    let is_path = |target: &str| description.named_files().any(|file| file == Path::new(target));
+    sent.rename_targets(|target| match is_path(target) {
+        true => absolute_text(Path::new(target)),
+        false => target.to_owned(),
+    });
+    sent
 }
 
 /// The package at work in an interpreter.
@@ -152,9 +169,33 @@ fn read_frame(stdout: &mut impl BufRead) -> Option<Frame> {
 
 #[cfg(test)]
 mod tests {
-    //! Frames are read as they are sent, and broken ones end the stream.
+    //! Jobs for other folders; frames are read as they are sent, and broken ones end the stream.
 
     use super::*;
+
+    #[test]
+    fn targets_that_are_paths_are_sent_as_absolute_paths() {
+        let mut description = SceneDescription::of_files(["scans/a.laz", "scans/b.laz"]);
+        let set = |description: &mut SceneDescription, key: &str, value: Value| {
+            description.set(key, &value, Path::new("")).unwrap();
+        };
+        let materials = ["metal", "scans/a.laz=mirror", "scans/b.laz=glass", "b=matte"];
+        set(&mut description, "material", json!(materials));
+        let settings = ["scans/b.laz:color=class", "scans/a.laz:label=A"];
+        set(&mut description, "object_settings", json!(settings));
+        description.apply_object_settings().unwrap();
+        let job = job("tcp://x:1", &description, &[0], "png").unwrap();
+        let folder = absolute("scans").unwrap().display().to_string();
+        assert_eq!(job["files"], json!([format!("{folder}/a.laz")]));
+        let scene: Value = serde_json::from_str(job["scene"].as_str().unwrap()).unwrap();
+        let [a, b] = ["a", "b"].map(|name| format!("{folder}/{name}.laz"));
+        let targets = json!(["metal", format!("{a}=mirror"), format!("{b}=glass"), "b=matte"]);
+        assert_eq!(scene["material"], targets);
+        assert_eq!(scene["object_settings"], json!([format!("{a}:label=A")]));
+        assert_eq!(scene["object"][0]["file"], json!(b));
+        let sent = SceneDescription::from_table(scene.as_object().unwrap(), Path::new("/"));
+        assert!(sent.is_ok(), "{sent:?}");
+    }
 
     #[test]
     fn frames_are_read_one_after_the_other() {

@@ -88,23 +88,13 @@ pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescriptio
     }
     limits.check_samples(page.picture.spp(), page.picture.light_samples())?;
     page.run = startup.run.clone();
-    rename_targets(&mut page, |name| rows.target_of(name).to_owned());
+    page.rename_targets(|name| rows.target_of(name).to_owned());
     let mut page = page.with_content_of(startup);
     added.iter().for_each(|file| file.add_to(&mut page));
     page.apply_object_settings().map_err(rejection)?;
     // Files with settings of their own became objects behind them.
     page.objects.sort_by_key(is_added);
     Ok(page)
-}
-
-/// Gives the materials and settings of files and objects other targets.
-fn rename_targets(page: &mut SceneDescription, renamed: impl Fn(&str) -> String) {
-    let choices = page.materials.material.iter_mut().flatten();
-    let materials = choices.filter_map(|choice| choice.target.as_mut());
-    let settings = page.overrides.object_settings.iter_mut().flatten();
-    for target in materials.chain(settings.map(|one| &mut one.target)) {
-        *target = renamed(target);
-    }
 }
 
 /// Returns the settings of a complete description as a page sees them, with targets as the page names them, and with what
@@ -118,7 +108,7 @@ pub fn complete_settings(
     let (materials, overrides) = (requested.materials.clone(), requested.overrides.clone());
     let mut complete = SceneDescription { materials, overrides, ..complete };
     complete.output.time = Some(requested.output.time());
-    rename_targets(&mut complete, |target| content.rows.name_of(target).to_owned());
+    complete.rename_targets(|target| content.rows.name_of(target).to_owned());
     let of_page = [added_files::KEY, camera_path::KEY].into_iter();
     let of_page = of_page.filter_map(|key| settings.get_key_value(key));
     let of_page: Vec<_> = of_page.map(|(key, value)| (key.clone(), value.clone())).collect();
@@ -164,7 +154,7 @@ pub fn from_file(
     let settings = description.overrides.all().iter().cloned().chain(own);
     // The files are read as at the start.
     let settings = settings.filter(|one| !is_fixed(one)).collect();
-    rename_targets(&mut description, |target| rows.name_of(target).to_owned());
+    description.rename_targets(|target| rows.name_of(target).to_owned());
     if table.contains_key("object") {
         // Objects without a material or settings have none, whatever the page chose before.
         description.materials.material = Some(all);

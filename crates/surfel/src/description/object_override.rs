@@ -148,6 +148,16 @@ impl OverrideSettings {
 }
 
 impl SceneDescription {
+    /// Gives the materials and settings of files and objects other targets.
+    pub fn rename_targets(&mut self, renamed: impl Fn(&str) -> String) {
+        let choices = self.materials.material.iter_mut().flatten();
+        let materials = choices.filter_map(|choice| choice.target.as_mut());
+        let settings = self.overrides.object_settings.iter_mut().flatten();
+        for target in materials.chain(settings.map(|one| &mut one.target)) {
+            *target = renamed(target);
+        }
+    }
+
     /// Gives files and objects their settings by name: a file becomes an object, which holds them, unless it is a label.
     /// Doing so twice changes nothing more.
     ///
