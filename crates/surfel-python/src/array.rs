@@ -1,6 +1,7 @@
 //! Arrays of numpy as columns of Rust.
 
 use crate::errors::invalid_array;
+use crate::work;
 use numpy::{Element, PyArrayDyn, PyArrayMethods};
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
@@ -24,8 +25,8 @@ pub fn checked<'py>(
 }
 
 /// Copies an array whose rows lie one after the other.
-pub fn column<T: Element + Copy>(array: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
-    with_slice(array, <[T]>::to_vec)
+pub fn column<T: Element + Copy + Send>(array: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    converted(array, <[T]>::to_vec)
 }
 
 /// Calls `read` with the numbers of an array whose rows lie one after the other.
@@ -39,6 +40,14 @@ pub fn with_slice<T: Element, R>(
     Ok(read(numbers))
 }
 
+/// Calls `convert` with the numbers of an array whose rows lie one after the other, without the interpreter.
+fn converted<T: Element, R: Send>(
+    array: &Bound<'_, PyAny>,
+    convert: impl FnOnce(&[T]) -> R + Send,
+) -> PyResult<R> {
+    with_slice(array, |numbers| work::detached(array.py(), || convert(numbers)))?
+}
+
 /// Returns true for an array of float32.
 fn is_single(array: &Bound<'_, PyAny>) -> bool {
     array.cast::<PyArrayDyn<f32>>().is_ok()
@@ -47,9 +56,9 @@ fn is_single(array: &Bound<'_, PyAny>) -> bool {
 /// Reads an array of three numbers a row as vectors.
 pub fn vectors(array: &Bound<'_, PyAny>) -> PyResult<Vec<Vec3>> {
     if is_single(array) {
-        return with_slice::<f32, _>(array, |numbers| bytemuck::cast_slice(numbers).to_vec());
+        return converted::<f32, _>(array, |numbers| bytemuck::cast_slice(numbers).to_vec());
     }
-    with_slice::<f64, _>(array, |numbers| relative(numbers, DVec3::ZERO))
+    converted::<f64, _>(array, |numbers| relative(numbers, DVec3::ZERO))
 }
 
 /// Reads an array of numbers as float32.
@@ -57,15 +66,15 @@ pub fn singles(array: &Bound<'_, PyAny>) -> PyResult<Vec<f32>> {
     if is_single(array) {
         return column(array);
     }
-    with_slice::<f64, _>(array, |numbers| numbers.iter().map(|x| *x as f32).collect())
+    converted::<f64, _>(array, |numbers| numbers.iter().map(|x| *x as f32).collect())
 }
 
 /// Reads world positions, and chooses the origin that the result counts from.
 pub fn positions(array: &Bound<'_, PyAny>) -> PyResult<(DVec3, Vec<Vec3>)> {
     if is_single(array) {
-        return with_slice::<f32, _>(array, with_origin);
+        return converted::<f32, _>(array, with_origin);
     }
-    with_slice::<f64, _>(array, with_origin)
+    converted::<f64, _>(array, with_origin)
 }
 
 fn with_origin<T: Copy + Into<f64> + Sync>(numbers: &[T]) -> (DVec3, Vec<Vec3>) {
@@ -98,10 +107,12 @@ pub fn scaled_positions(
         let [x, y, z] = [0, 1, 2].map(|axis| f64::from(columns[axis][i]));
         scales * DVec3::new(x, y, z) + offsets
     };
-    let n_points = columns.iter().map(Vec::len).min().unwrap_or_default();
-    let step = n_points.div_ceil(ORIGIN_SAMPLE).max(1);
-    let sample: Vec<DVec3> = (0..n_points).step_by(step).map(world).collect();
-    let origin = PointCloud::choose_origin(&sample);
-    let all = (0..n_points).into_par_iter().with_min_len(CHUNK);
-    Ok((origin, all.map(|i| (world(i) - origin).as_vec3()).collect()))
+    work::detached(x.py(), || {
+        let n_points = columns.iter().map(Vec::len).min().unwrap_or_default();
+        let step = n_points.div_ceil(ORIGIN_SAMPLE).max(1);
+        let sample: Vec<DVec3> = (0..n_points).step_by(step).map(world).collect();
+        let origin = PointCloud::choose_origin(&sample);
+        let all = (0..n_points).into_par_iter().with_min_len(CHUNK);
+        (origin, all.map(|i| (world(i) - origin).as_vec3()).collect())
+    })
 }

@@ -164,7 +164,7 @@ impl PyImage {
 
     /// Bytes of the picture as a PNG, which notebooks show.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = py.detach(|| self.shared.image.png_bytes());
+        let bytes = work::detached(py, || self.shared.image.png_bytes())?;
         Ok(PyBytes::new(py, &bytes.map_err(|error| to_exception(py, &error))?))
     }
 

@@ -2,6 +2,7 @@
 
 use crate::errors::{exception, invalid_setting};
 use crate::scene::PyScene;
+use crate::work;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
@@ -84,7 +85,7 @@ pub fn view(
 ) -> PyResult<PyViewer> {
     let description = scene.get().description();
     description.check_is_not_empty().map_err(|error| invalid_setting(py, error))?;
-    let running = RunningViewer::start(description, port)
+    let running = work::detached(py, || RunningViewer::start(description, port))?
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
     let (link, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());
     if open {

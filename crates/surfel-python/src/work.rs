@@ -1,4 +1,4 @@
-//! Long work: it runs on a thread of its own without the interpreter, while the caller's thread reports progress and
+//! Work without the interpreter. Long work runs on a thread of its own, while the caller's thread reports progress and
 //! looks for Ctrl-C.
 
 use crate::errors::{panicked, to_exception};
@@ -76,6 +76,16 @@ fn run_reporting<T: Send>(
             }
         }
     })
+}
+
+/// Runs `work` on the caller's thread without the interpreter: short work, which reports nothing and is not stopped.
+///
+/// # Errors
+///
+/// Fails in a process that was forked after the threads of surfel were started.
+pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    check_process()?;
+    Ok(py.detach(work))
 }
 
 /// Fails in a process that was forked after the threads of surfel were started: they do not exist there, and waiting

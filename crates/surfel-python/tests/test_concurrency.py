@@ -130,16 +130,59 @@ def render_in_child(queue):
         queue.put(repr(error))
 
 
+def forked(work, *arguments):
+    """What `work` puts into its queue in a process that is forked now."""
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=work, args=(queue, *arguments))
+    process.start()
+    try:
+        return queue.get(timeout=60)
+    finally:
+        process.kill()
+        process.join()
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 def test_forked_processes_raise_instead_of_waiting(hill):
     surfel.load(hill)
-    context = multiprocessing.get_context("fork")
-    queue = context.Queue()
-    process = context.Process(target=render_in_child, args=(queue,))
-    process.start()
-    assert "was forked" in queue.get(timeout=60)
-    process.join(60)
-    assert process.exitcode == 0
+    assert "was forked" in forked(render_in_child)
+
+
+def outcome(queue, work):
+    try:
+        queue.put(repr(work()))
+    except RuntimeError as error:
+        queue.put(str(error))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.parametrize("kind", ["cloud", "mesh", "rays", "view"])
+def test_forked_processes_convert_no_arrays_and_show_no_viewer(hill, kind):
+    # So many points are converted on several threads.
+    many = hill_points(450)
+    scene = surfel.load(hill)
+    scene.render(**SMALL)
+    work = {
+        "cloud": lambda: surfel.Cloud(many),
+        "mesh": lambda: surfel.Mesh(many, [[0, 1, 2]]),
+        "rays": lambda: scene.cast_rays(numpy.hstack([many, many])),
+        "view": lambda: surfel.view(scene),
+    }
+    assert "was forked" in forked(outcome, work[kind])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_clouds_start_the_threads_that_forked_processes_lack():
+    code = f"""
+import sys
+sys.path.insert(0, {os.path.dirname(__file__)!r})
+import surfel, test_concurrency
+surfel.Cloud(test_concurrency.hill_points(450))
+print(test_concurrency.forked(test_concurrency.render_in_child))
+"""
+    program = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert "was forked" in program.stdout, program.stderr
 
 
 def test_spawned_processes_render():
