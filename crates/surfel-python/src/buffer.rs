@@ -1,6 +1,7 @@
-//! Columns that Rust owns as arrays of numpy, which are read-only and not copied.
+//! Columns that Rust holds as arrays of numpy, none of which is copied: those that are shared are read-only.
 
 use bytemuck::Pod;
+use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::any::Any;
@@ -73,12 +74,11 @@ pub fn shared_array<'py, E: Element, O: Any + Send + Sync>(
     py.import("numpy")?.call_method1("asarray", (Bound::new(py, buffer)?,))
 }
 
-/// Makes an array of numbers, which it owns.
-pub fn owned_array<'py, E: Element + Send + Sync>(
+/// Makes an array of numbers that belongs to the caller, who may write to it.
+pub fn owned_array<'py, E: numpy::Element>(
     py: Python<'py>,
     numbers: Vec<E>,
     shape: Vec<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let numbers = Arc::new(numbers);
-    shared_array(py, &numbers, &numbers, shape)
+    Ok(numbers.into_pyarray(py).reshape(shape)?.into_any())
 }

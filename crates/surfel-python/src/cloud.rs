@@ -100,9 +100,10 @@ impl PyCloud {
     /// World coordinates of the points: float64, (N, 3), a copy.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let n_points = self.cloud.len();
         let world = |i| self.cloud.world_position(i).to_array();
-        let numbers: Vec<f64> = (0..self.cloud.len()).flat_map(world).collect();
-        owned_array(py, numbers, vec![self.cloud.len(), 3])
+        let rows: Vec<[f64; 3]> = work::detached(py, || (0..n_points).map(world).collect())?;
+        owned_array(py, bytemuck::cast_vec::<[f64; 3], f64>(rows), vec![n_points, 3])
     }
 
     /// World coordinates of the zero of `local_points`.

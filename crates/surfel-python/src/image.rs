@@ -85,7 +85,8 @@ impl PyImage {
     /// Colour for display as in a PNG, not premultiplied, and alpha: uint8, (height, width, 4).
     #[getter]
     fn srgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let numbers = self.shared.srgb.get_or_init(|| srgb(&self.shared.image));
+        let Shared { image, srgb, .. } = &*self.shared;
+        let numbers = work::detached(py, || srgb.get_or_init(|| encoded(image)))?;
         shared_array(py, &self.shared, numbers, self.shape(Some(4)))
     }
 
@@ -112,7 +113,9 @@ impl PyImage {
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let aovs = self.aovs()?;
-        let numbers = self.shared.positions.get_or_init(|| positions(aovs, self.shared.origin));
+        let Shared { positions, origin, .. } = &*self.shared;
+        let world = || positions.get_or_init(|| world_positions(aovs, *origin));
+        let numbers = work::detached(py, world)?;
         shared_array(py, &self.shared, numbers, self.shape(Some(3)))
     }
 
@@ -173,7 +176,7 @@ impl PyImage {
     }
 }
 
-fn positions(aovs: &Aovs, origin: DVec3) -> Vec<f64> {
+fn world_positions(aovs: &Aovs, origin: DVec3) -> Vec<f64> {
     let pixels = aovs.position.iter().zip(&aovs.depth);
     let position = |(position, depth): (&Vec3, &f32)| match depth.is_finite() {
         true => (origin + position.as_dvec3()).to_array(),
@@ -182,7 +185,7 @@ fn positions(aovs: &Aovs, origin: DVec3) -> Vec<f64> {
     pixels.flat_map(position).collect()
 }
 
-fn srgb(image: &Image) -> Vec<u8> {
+fn encoded(image: &Image) -> Vec<u8> {
     let pixel = |[r, g, b, a]: &[f32; 4]| {
         let scale = if 0.0 < *a { a.recip() } else { 0.0 };
         let alpha = (255.0 * a.clamp(0.0, 1.0)).round() as u8;

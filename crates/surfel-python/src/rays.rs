@@ -7,9 +7,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use surfel::live_view::LiveView;
-use surfel::ray_query::{RayHits, WorldRays};
+use surfel::ray_query::{RayCaster, RayHits, WorldRays};
 use surfel_core::image::NO_ID;
 use surfel_core::math::morton_decode;
+use surfel_core::progress::Progress;
+use surfel_core::trace::Simd;
 
 /// Rays of an array (..., 6).
 pub struct RayArray<'py> {
@@ -19,6 +21,17 @@ pub struct RayArray<'py> {
     pub shape: Vec<usize>,
     /// Order in which rays of a picture are traced; none for any others.
     order: Option<TileOrder>,
+}
+
+/// The numbers of rays, which are read without the interpreter.
+pub struct RayRows<'a> {
+    numbers: RayNumbers<'a>,
+    order: Option<&'a TileOrder>,
+}
+
+enum RayNumbers<'a> {
+    Single(&'a [f32]),
+    Double(&'a [f64]),
 }
 
 /// Pixels along the side of a tile of a picture.
@@ -36,18 +49,36 @@ impl<'py> RayArray<'py> {
         Ok(Self { array, shape, order })
     }
 
-    /// Returns the rays relative to the origin of a view's scene, in the order in which they are traced. They are copied
-    /// while the interpreter waits: whoever changes the array later changes nothing.
-    pub fn in_scene(&self, view: &LiveView, t_range: (f32, f32)) -> PyResult<WorldRays> {
+    /// Calls `read` with the numbers of the rays.
+    pub fn with_rows<R>(&self, read: impl FnOnce(RayRows<'_>) -> PyResult<R>) -> PyResult<R> {
+        let order = self.order.as_ref();
         if self.array.cast::<PyArrayDyn<f32>>().is_ok() {
-            return with_slice::<f32, _>(&self.array, |numbers| {
-                let rays = numbers.as_chunks::<6>().0;
-                self.ordered(rays, |ray| ray.map(f64::from), view, t_range)
-            });
+            return with_slice(&self.array, |numbers| {
+                read(RayRows { numbers: RayNumbers::Single(numbers), order })
+            })?;
         }
-        with_slice::<f64, _>(&self.array, |numbers| {
-            self.ordered(numbers.as_chunks::<6>().0, |ray| *ray, view, t_range)
-        })
+        with_slice(&self.array, |numbers| {
+            read(RayRows { numbers: RayNumbers::Double(numbers), order })
+        })?
+    }
+
+    /// Returns the interpreter.
+    pub fn py(&self) -> Python<'py> {
+        self.array.py()
+    }
+}
+
+impl RayRows<'_> {
+    /// Returns the rays relative to the origin of a view's scene, in the order in which they are traced.
+    fn in_scene(&self, view: &LiveView, t_range: (f32, f32)) -> WorldRays {
+        match self.numbers {
+            RayNumbers::Single(numbers) => {
+                self.ordered(numbers.as_chunks().0, |ray| ray.map(f64::from), view, t_range)
+            }
+            RayNumbers::Double(numbers) => {
+                self.ordered(numbers.as_chunks().0, |ray| *ray, view, t_range)
+            }
+        }
     }
 
     fn ordered<T: Sync>(
@@ -57,7 +88,7 @@ impl<'py> RayArray<'py> {
         view: &LiveView,
         t_range: (f32, f32),
     ) -> WorldRays {
-        match &self.order {
+        match self.order {
             Some(order) => {
                 let pixels = (0..rays.len()).into_par_iter().map(|i| ray(&rays[order.pixel(i)]));
                 WorldRays::new(pixels, t_range, &view.flat)
@@ -66,14 +97,9 @@ impl<'py> RayArray<'py> {
         }
     }
 
-    /// Returns the interpreter.
-    pub fn py(&self) -> Python<'py> {
-        self.array.py()
-    }
-
     /// Puts answers into the order of the array.
-    pub fn restored<T: Copy + Send>(&self, mut answers: Vec<T>) -> Vec<T> {
-        let Some(order) = &self.order else { return answers };
+    fn restored<T: Copy + Send>(&self, mut answers: Vec<T>) -> Vec<T> {
+        let Some(order) = self.order else { return answers };
         // In place, row by row of tiles, so that no second copy of the columns is held.
         answers.par_chunks_mut(order.row.len()).for_each_init(Vec::new, |ordered, row| {
             ordered.clear();
@@ -83,6 +109,49 @@ impl<'py> RayArray<'py> {
             }
         });
         answers
+    }
+}
+
+/// Rays at a view. What it says of each ray is in the order of the array.
+pub struct RayQuery<'a> {
+    view: &'a LiveView,
+    caster: RayCaster<'a>,
+    /// The rays in the order in which they are traced.
+    rays: WorldRays,
+    rows: RayRows<'a>,
+}
+
+impl<'a> RayQuery<'a> {
+    /// Rays at a view, of which the part `t_range` counts.
+    pub fn new(rows: RayRows<'a>, t_range: (f32, f32), view: &'a LiveView, simd: Simd) -> Self {
+        Self { view, caster: view.ray_caster(simd), rays: rows.in_scene(view, t_range), rows }
+    }
+
+    /// Finds the nearest surfaces; the instances of the hits are the numbers of what was added.
+    pub fn hits(&self, progress: &dyn Progress) -> surfel::Result<RayHits> {
+        let RayHits { t_hit, mut instances, primitives, normals, points } =
+            self.caster.hits(&self.rays, progress)?;
+        let contents = self.view.contents();
+        let content = |instance: u32| contents.get(instance as usize).copied().unwrap_or(NO_ID);
+        instances.par_iter_mut().for_each(|instance| *instance = content(*instance));
+        Ok(RayHits {
+            t_hit: self.rows.restored(t_hit),
+            instances: self.rows.restored(instances),
+            primitives: self.rows.restored(primitives),
+            normals: self.rows.restored(normals),
+            points: self.rows.restored(points),
+        })
+    }
+
+    /// Finds out whether any surface lies on each ray.
+    pub fn occlusions(&self, progress: &dyn Progress) -> surfel::Result<Vec<bool>> {
+        Ok(self.rows.restored(self.caster.occlusions(&self.rays, progress)?))
+    }
+
+    /// Counts the surfaces on each ray.
+    pub fn counts(&self, progress: &dyn Progress) -> surfel::Result<Vec<i32>> {
+        let counts = self.rows.restored(self.caster.counts(&self.rays, progress)?);
+        Ok(counts.into_iter().map(|n| n as i32).collect())
     }
 }
 
@@ -136,24 +205,19 @@ fn tile_row(height: u32, width: u32) -> Vec<u32> {
     inside.map(|(x, y)| y * width + x).collect()
 }
 
-/// Returns hits as a dict of arrays; `contents` has the number of what each instance shows.
+/// Returns hits as a dict of arrays of this shape.
 pub fn ray_hits<'py>(
     py: Python<'py>,
-    rays: &RayArray<'_>,
+    shape: &[usize],
     hits: RayHits,
-    contents: &[u32],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let shape = &rays.shape;
-    let content = |instance: u32| contents.get(instance as usize).copied().unwrap_or(NO_ID);
-    let mut geometries = hits.instances;
-    geometries.par_iter_mut().for_each(|instance| *instance = content(*instance));
     let vectors = shape.iter().copied().chain([3]).collect();
-    let normals = bytemuck::cast_vec::<[f32; 3], f32>(rays.restored(hits.normals));
+    let normals = bytemuck::cast_vec::<[f32; 3], f32>(hits.normals);
     let all = PyDict::new(py);
-    all.set_item("t_hit", owned_array(py, rays.restored(hits.t_hit), shape.clone())?)?;
-    all.set_item("geometry_ids", owned_array(py, rays.restored(geometries), shape.clone())?)?;
-    all.set_item("primitive_ids", owned_array(py, rays.restored(hits.primitives), shape.clone())?)?;
+    all.set_item("t_hit", owned_array(py, hits.t_hit, shape.to_vec())?)?;
+    all.set_item("geometry_ids", owned_array(py, hits.instances, shape.to_vec())?)?;
+    all.set_item("primitive_ids", owned_array(py, hits.primitives, shape.to_vec())?)?;
     all.set_item("primitive_normals", owned_array(py, normals, vectors)?)?;
-    all.set_item("point_ids", owned_array(py, rays.restored(hits.points), shape.clone())?)?;
+    all.set_item("point_ids", owned_array(py, hits.points, shape.to_vec())?)?;
     Ok(all)
 }

@@ -7,7 +7,7 @@ use crate::height_map::PyHeightMap;
 use crate::image::PyImage;
 use crate::object::NewObject;
 use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
-use crate::rays::{RayArray, ray_hits};
+use crate::rays::{RayArray, RayQuery, ray_hits};
 use crate::value::{to_python, with_keys};
 use crate::work;
 use pyo3::prelude::*;
@@ -20,7 +20,6 @@ use surfel::live_scene::LiveScene;
 use surfel::live_view::LiveView;
 use surfel::overlay::faults;
 use surfel::progress_log::Choice;
-use surfel::ray_query::{RayCaster, WorldRays};
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::{Image, class_color, class_name};
 use surfel_core::math::Vec3;
@@ -98,19 +97,22 @@ impl PyScene {
         rays: &RayArray<'_>,
         t_range: (f32, f32),
         progress: Option<&Bound<'_, PyAny>>,
-        query: impl FnOnce(&RayCaster<'_>, &WorldRays, &dyn Progress) -> surfel::Result<T> + Send,
-    ) -> PyResult<(T, Arc<ChosenView>)> {
+        query: impl FnOnce(&RayQuery<'_>, &dyn Progress) -> surfel::Result<T> + Send,
+    ) -> PyResult<T> {
         let py = rays.py();
         let (scene, chosen) = self.open_view(py, None, progress)?;
-        if uses_rasterizer(&chosen.view.flat).unwrap_or(false) {
+        let view = &chosen.view;
+        if uses_rasterizer(&view.flat).unwrap_or(false) {
             let advice = "points have no surface that rays meet; choose another, as `smooth`";
             return Err(invalid_setting(py, Invalid::at("surface", advice)));
         }
-        let local = rays.in_scene(&chosen.view, t_range)?;
-        let answers = work::run(py, progress, |progress| {
-            scene.install(|scene| query(&chosen.view.ray_caster(scene.simd()), &local, progress))
-        })?;
-        Ok((answers, chosen))
+        rays.with_rows(|rows| {
+            work::run(py, progress, |progress| {
+                scene.install(|scene| {
+                    query(&RayQuery::new(rows, t_range, view, scene.simd()), progress)
+                })
+            })
+        })
     }
 }
 
@@ -174,12 +176,9 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = RayArray::new(rays)?;
-        let (hits, chosen) =
-            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
-                caster.hits(rays, progress)
-            })?;
-        let contents = chosen.view.contents();
-        ray_hits(py, &rays, hits, &contents)
+        let hits =
+            self.query_rays(&rays, WHOLE_RAY, progress, |query, progress| query.hits(progress))?;
+        ray_hits(py, &rays.shape, hits)
     }
 
     /// Returns for each ray whether any surface lies on it: bool, (...).
@@ -196,13 +195,10 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
-        let t_range = (tnear, tfar);
-        let (occluded, _) =
-            self.query_rays(&rays, t_range, progress, |caster, rays, progress| {
-                caster.occlusions(rays, progress)
-            })?;
-        let occluded = rays.restored(occluded).into_iter().map(u8::from).collect::<Vec<u8>>();
-        owned_array(py, occluded, rays.shape)?.call_method1("view", ("bool",))
+        let occluded = self.query_rays(&rays, (tnear, tfar), progress, |query, progress| {
+            query.occlusions(progress)
+        })?;
+        owned_array(py, occluded, rays.shape)
     }
 
     /// Counts the surfaces on each ray: int32, (...).
@@ -216,11 +212,8 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
-        let (counts, _) =
-            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
-                caster.counts(rays, progress)
-            })?;
-        let counts = rays.restored(counts).into_iter().map(|n| n as i32).collect();
+        let counts =
+            self.query_rays(&rays, WHOLE_RAY, progress, |query, progress| query.counts(progress))?;
         owned_array(py, counts, rays.shape)
     }
 

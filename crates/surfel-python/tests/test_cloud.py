@@ -60,6 +60,15 @@ def test_arrays_of_many_kinds_are_the_same_cloud(points, convert):
     assert numpy.allclose(cloud.points, points, atol=1e-6)
 
 
+def test_coordinates_are_a_copy_that_may_be_changed(points):
+    cloud = surfel.Cloud(points)
+    world = cloud.points
+    world -= world.mean(axis=0)
+    assert numpy.allclose(cloud.points, points, atol=1e-6)
+    with pytest.raises(ValueError, match="read-only"):
+        cloud.local_points[0] = 0
+
+
 def test_integers_are_taken(points):
     cloud = surfel.Cloud((points * 1000).astype("i2"))
     assert (cloud.points == (points * 1000).astype("i2")).all()

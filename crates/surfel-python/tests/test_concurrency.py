@@ -71,6 +71,36 @@ def test_other_threads_run_while_a_picture_is_rendered(hill):
     assert 10 < len(ticks)
 
 
+@pytest.mark.parametrize("kind", ["cloud", "rays"])
+def test_other_threads_run_while_arrays_wait_for_a_picture(hill, kind):
+    many = hill_points(450)
+    small = surfel.Scene()
+    small.add(surfel.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    rays = numpy.hstack([many, many])
+    small.cast_rays(rays[:1])
+    scene, has_begun, has_ended = surfel.load(hill), threading.Event(), threading.Event()
+    scene.render(**SMALL)
+
+    def report(stage, done, total):
+        has_begun.set()
+        if has_ended.is_set():
+            raise InterruptedError
+
+    def render():
+        with pytest.raises(InterruptedError):
+            scene.render(progress=report, **LONG)
+
+    convert = {"cloud": lambda: surfel.Cloud(many), "rays": lambda: small.cast_rays(rays)}[kind]
+    rendering, converting = threading.Thread(target=render), threading.Thread(target=convert)
+    rendering.start()
+    assert has_begun.wait(60)
+    converting.start()
+    [time.sleep(0.01) for _ in range(20)]
+    assert rendering.is_alive()
+    has_ended.set()
+    [thread.join() for thread in (rendering, converting)]
+
+
 def test_progress_is_reported(hill):
     reports = []
     surfel.load(hill).render(resolution=(640, 480), progress=lambda *report: reports.append(report))

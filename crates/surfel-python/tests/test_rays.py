@@ -42,6 +42,17 @@ def test_rays_have_any_leading_shape(scene):
     assert scene.cast_rays(numpy.zeros((0, 6)))["t_hit"].shape == (0,)
 
 
+def test_answers_may_be_changed(scene):
+    rays = numpy.tile(ray(0.5), (2, 3, 1))
+    answers = [*scene.cast_rays(rays).values(), scene.test_occlusions(rays), scene.count_intersections(rays), scene.bounds]
+    for answer in answers:
+        assert answer.flags.writeable and answer.flags.c_contiguous
+        answer += answer
+    assert (scene.count_intersections(rays) == 2).all() and scene.test_occlusions(rays).dtype == bool
+    empty = scene.cast_rays(numpy.zeros((0, 6)))
+    assert empty["t_hit"].shape == (0,) and empty["primitive_normals"].shape == (0, 3)
+
+
 def test_single_precision_rays_and_views_are_taken(scene):
     rays = numpy.array([ray(0.5), ray(5.0)])
     for same in (rays[::-1], numpy.hstack([rays, rays])[::-1, ::1][:, :6], rays[::-1].astype(">f8")):
