@@ -81,7 +81,9 @@ def colors(values, n_points):
         # Numbers that are not finite fail here too.
         if array.size and not (0 <= array.min() and array.max() <= 1):
             raise InvalidArray(f"colors: found {array.min()} to {array.max()}, expected 0 to 1 in {array.dtype}")
-        return numpy.rint(array * 65535).astype(numpy.uint16)
+        # The largest number of float16 is 65504.
+        wide = array.astype("f4") if array.dtype.itemsize < 4 else array
+        return numpy.rint(wide * 65535).astype(numpy.uint16)
     if array.dtype != numpy.uint16:
         expected = "integers from 0 to 255 or 65535, or numbers from 0 to 1"
         found = f"{array.min()} to {array.max()}" if array.size and array.dtype.kind in "iu" else "numbers"
