@@ -3,6 +3,7 @@
     python film_on_dask.py scan.laz frames/frame_####.png 640x360 200 tcp://scheduler:8786
 """
 
+import pathlib
 import sys
 
 from dask.distributed import Client, LocalCluster
@@ -10,6 +11,7 @@ from surfel.dask import Recipe, save_frames
 
 
 def main(scan, pattern, resolution="640x360", frames=200, scheduler=None):
+    pathlib.Path(pattern).parent.mkdir(parents=True, exist_ok=True)
     cluster = scheduler or LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
     with Client(cluster):
         recipe = Recipe(scan, turntable=8, resolution=resolution)

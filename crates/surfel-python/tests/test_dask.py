@@ -111,6 +111,34 @@ def kill_after_a_file(process, folder):
     process.kill()
 
 
+def test_frames_are_written_where_the_client_runs(recipe, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.chdir(tmp_path)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            client.run(os.chdir, os.path.dirname(tmp_path))
+            names = save_frames(recipe, range(2), "frame_##.png")
+    assert names == [str(tmp_path / name) for name in ("frame_01.png", "frame_02.png")]
+    assert sorted(os.listdir(tmp_path)) == ["frame_01.png", "frame_02.png"]
+    assert dask.compute(*render_frames(recipe, range(2))) == tuple(open(name, "rb").read() for name in names)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions of Unix")
+def test_frames_have_the_permissions_of_other_files(recipe, tmp_path):
+    (tmp_path / "other").touch()
+    name = save_frames(recipe, range(1), tmp_path / "frame_##.png")[0]
+    assert os.stat(name).st_mode == (tmp_path / "other").stat().st_mode
+
+
+def test_missing_folders_are_told_before_the_work(tmp_path):
+    with pytest.raises(surfel.InaccessibleFile, match="frame_##.png: cannot be written: there is no folder .*nowhere"):
+        save_frames(Recipe("nowhere.ply", turntable=1), range(2), tmp_path / "nowhere" / "frame_##.png")
+
+
+def test_lost_clusters_are_told_across_processes():
+    assert str(pickle.loads(pickle.dumps(ClusterLost()))) == str(ClusterLost())
+
+
 @pytest.mark.parametrize("tiles", [0, (0, 4), (1, 2, 3), "4x4", 2.5, (2, -1)])
 def test_other_tiles_are_refused(recipe, tiles):
     with pytest.raises(surfel.InvalidSetting, match="tiles: found"):

@@ -7,9 +7,10 @@ import concurrent.futures
 import json
 import sys
 
-from distributed import Client, as_completed
+from distributed import Client
 
 from surfel.dask import ClusterLost, Recipe, render_frames
+from surfel.dask._frames import completed
 
 #: Seconds in which a scheduler must answer.
 TIMEOUT_SECS = 10
@@ -35,14 +36,11 @@ def main():
 
 def write_frames(client, recipe, job):
     """Writes frames in the order in which they are finished."""
-    futures = client.compute(render_frames(recipe, job["frames"], format=job["format"]))
-    indices = dict(zip(futures, job["frames"]))
-    for future, content in as_completed(futures, with_results=True):
-        sys.stdout.buffer.write(b"%d %d\n" % (indices[future], len(content)))
+    pictures = render_frames(recipe, job["frames"], format=job["format"])
+    for index, content in completed(client, job["frames"], pictures):
+        sys.stdout.buffer.write(b"%d %d\n" % (index, len(content)))
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
-        # The workers need not keep it.
-        future.release()
 
 
 if __name__ == "__main__":

@@ -1,14 +1,15 @@
 """Frames of a film."""
 
 import concurrent.futures
+import contextlib
 import os
 import pathlib
 import re
-import tempfile
+import uuid
 
 import dask
 
-from surfel._errors import InvalidSetting
+from surfel._errors import InaccessibleFile, InvalidSetting
 from surfel.dask import _worker
 from surfel.dask._recipe import ClusterLost
 
@@ -23,24 +24,49 @@ def render_frames(recipe, frames, *, format="png"):
 
 
 def save_frames(recipe, frames, pattern):
-    """Renders frames and writes each to a file, `####` in whose name is its number from 1; returns the names.
+    """Renders frames and writes each to a file of this machine, `####` in whose name is its number from 1.
 
-    Files that are there already are kept, so that an interrupted film goes on.
+    Returns the names. Files that are there already are kept, so that an interrupted film goes on.
 
-    Raises `InvalidSetting` for a pattern without `#`, and `ClusterLost` if the scheduler vanishes.
+    Raises `InvalidSetting` for a pattern without `#`, `InaccessibleFile` if there is no such folder or a file cannot be
+    written, and `ClusterLost` if the scheduler vanishes.
     """
-    pattern = os.fspath(pattern)
-    if "#" not in os.path.basename(pattern):
+    pattern = os.path.abspath(os.fspath(pattern))
+    folder, name = os.path.split(pattern)
+    if "#" not in name:
         raise InvalidSetting("pattern: found no #, expected a name as in frame_####.png")
+    if not os.path.isdir(folder):
+        raise InaccessibleFile(f"{pattern}: cannot be written: there is no folder `{folder}`; create it first")
     names = {index: _frame_name(pattern, index) for index in frames}
     missing = [index for index, name in names.items() if not os.path.exists(name)]
     pictures = render_frames(recipe, missing, format=pathlib.Path(pattern).suffix[1:])
-    save = dask.delayed(_replace)
-    try:
+    client = getattr(dask.base.get_scheduler(), "__self__", None)
+    if client is None:
+        # Threads and processes of this machine, which need not hand the bytes on.
+        save = dask.delayed(_write)
         dask.compute(*(save(names[index], picture) for index, picture in zip(missing, pictures)))
+        return list(names.values())
+    try:
+        for index, content in completed(client, missing, pictures):
+            _write(names[index], content)
     except concurrent.futures.CancelledError as error:
         raise ClusterLost() from error
     return list(names.values())
+
+
+def completed(client, indices, pictures):
+    """Pairs of an index and the bytes of its picture, in the order in which a cluster finishes them."""
+    from distributed import as_completed
+
+    futures = client.compute(pictures)
+    indices = dict(zip(futures, indices))
+    for future, content in as_completed(futures, with_results=True):
+        # Where the scheduler has vanished, the error stands in place of the bytes.
+        if isinstance(content, concurrent.futures.CancelledError):
+            raise content
+        yield indices[future], content
+        # The workers need not keep it.
+        future.release()
 
 
 def _frame(recipe, index, format):
@@ -54,8 +80,14 @@ def _frame_name(pattern, index):
     return os.path.join(folder, re.sub("#+", lambda hashes: str(index + 1).zfill(len(hashes[0])), name, count=1))
 
 
-def _replace(name, content):
+def _write(name, content):
     """Writes a file beside its name first, so that no half file is ever under it."""
-    with tempfile.NamedTemporaryFile(dir=os.path.dirname(name) or ".", delete=False) as file:
-        file.write(content)
-    os.replace(file.name, name)
+    beside = f"{name}.{uuid.uuid4().hex}.part"
+    try:
+        with open(beside, "xb") as file:
+            file.write(content)
+        os.replace(beside, name)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            os.remove(beside)
+        raise InaccessibleFile(f"{name}: cannot be written: {error.strerror}") from error

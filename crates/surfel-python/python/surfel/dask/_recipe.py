@@ -14,8 +14,10 @@ class VersionMismatch(Error):
 class ClusterLost(Error):
     """The scheduler is gone, or has cancelled the work."""
 
-    def __init__(self):
-        super().__init__("the scheduler is gone or has cancelled the work; start it and do the same again: finished frames are kept")
+    ADVICE = "the scheduler is gone or has cancelled the work; start it and do the same again: finished frames are kept"
+
+    def __init__(self, message=ADVICE):
+        super().__init__(message)
 
 
 class Recipe:
