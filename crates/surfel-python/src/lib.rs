@@ -44,6 +44,8 @@ mod native {
     #[pymodule_export]
     use crate::scene::{_unread, PyScene, load};
     #[pymodule_export]
+    use crate::value::_plain;
+    #[pymodule_export]
     use crate::viewer::{PyViewer, view};
 
     #[pymodule_init]

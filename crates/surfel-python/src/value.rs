@@ -4,7 +4,8 @@ use crate::errors::invalid_setting;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
-use serde_json::{Map, Number, Value};
+use serde_json::{Map, Number, Value, json};
+use std::path::{Path, absolute};
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 
@@ -33,6 +34,41 @@ pub fn with_keys(
     description.overlay(layer);
     description.check().map_err(|error| invalid_setting(py, error))?;
     Ok(description)
+}
+
+/// Returns keywords as a dict of plain values, with files named from the root: it means the same in another process.
+/// Unknown keys and wrong values stay as they are.
+#[pyfunction]
+#[pyo3(signature = (**keys))]
+pub fn _plain<'py>(
+    py: Python<'py>,
+    keys: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut table = table(keys)?;
+    table.iter_mut().for_each(|(key, value)| name_from_root(key, value));
+    to_python(py, &Value::Object(table))
+}
+
+/// Names the files among the values of a key from the root.
+fn name_from_root(path: &str, value: &mut Value) {
+    match value {
+        Value::Object(inner) => {
+            inner
+                .iter_mut()
+                .for_each(|(key, value)| name_from_root(&format!("{path}.{key}"), value));
+        }
+        Value::String(text) => {
+            let Ok(from_root) = absolute(&*text) else { return };
+            let from_root = from_root.display().to_string();
+            let mut read = SceneDescription::default();
+            let is_read = read.set(path, &json!(text), Path::new("")).is_ok();
+            // Names of files alone are written from the root.
+            if is_read && read.non_default().iter().any(|(_, written)| *written == from_root) {
+                *text = from_root;
+            }
+        }
+        _ => {}
+    }
 }
 
 /// Converts a value; `key` is the path that an error names.

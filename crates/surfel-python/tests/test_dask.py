@@ -1,6 +1,8 @@
 """Pictures by Dask: the program's bytes, on threads and on processes that die."""
 
+import datetime
 import os
+import pathlib
 import pickle
 import signal
 import subprocess
@@ -58,6 +60,25 @@ def test_recipes_travel_as_descriptions(hill, recipe):
     assert len(data) < 500
     assert pickle.loads(data) == recipe and hash(pickle.loads(data)) == hash(recipe)
     assert recipe != Recipe(hill, **SMALL)
+
+
+def test_recipes_are_equal_if_all_digits_are(hill):
+    numpy = pytest.importorskip("numpy")
+    near, far = (Recipe(hill, camera_position=numpy.array([1.0, 2.0, z])) for z in (3.0, 3.0000000001))
+    assert repr(near.keys["camera_position"]) == "[1.0, 2.0, 3.0]" and near != far
+    assert near == Recipe(hill, camera_position=(1.0, 2.0, 3.0)) == pickle.loads(pickle.dumps(near))
+    assert Recipe(hill, sun=datetime.datetime(2026, 6, 21, 15)) == Recipe(hill, sun="2026-06-21T15:00:00")
+    with pytest.raises(surfel.InvalidSetting, match="spp: found an object of type object"):
+        Recipe(hill, spp=object())
+
+
+def test_files_of_keywords_are_named_from_the_root(hill, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    keys = {"environment": pathlib.Path("sky.hdr"), "crop": "area.geojson", "color": "rgb", "up": None}
+    recipe = Recipe(hill, sky={"color": "white"}, **keys)
+    expected = {"environment": str(tmp_path / "sky.hdr"), "crop": str(tmp_path / "area.geojson"), "color": "rgb", "up": None}
+    assert recipe.keys == expected | {"sky": {"color": "white"}}
+    assert Recipe(hill, crop="POLYGON((0 0, 1 0, 1 1, 0 0))").keys["crop"].startswith("POLYGON")
 
 
 def test_recipes_of_other_versions_are_refused(recipe):

@@ -133,7 +133,7 @@ def test_the_ranges_of_colours_are_common(survey):
     found = layout(survey, color="elevation")
     ranges = [_survey(recipe)[2] for recipe in found.recipes]
     assert found.keys["range"] == (min(low for low, _ in ranges), max(high for _, high in ranges))
-    assert layout(survey, color="elevation", range=(490, 520)).keys["range"] == (490, 520)
+    assert layout(survey, color="elevation", range=(490, 520)).keys["range"] == [490, 520]
 
 
 def test_the_legend_has_the_classes_of_all_tiles(tmp_path):
@@ -186,6 +186,11 @@ def test_mosaics_are_geotiffs(survey):
 def test_recipes_that_do_not_fit_are_refused(recipes, words):
     with pytest.raises(surfel.InvalidSetting, match=words):
         render_mosaic(recipes)
+
+
+def test_keywords_of_tiles_may_be_arrays():
+    tile, other = (Recipe(name, gsd=1, range=numpy.array([0.0, 1.0])) for name in ("a.laz", "b.laz"))
+    render_mosaic([tile, other])
 
 
 def test_rims_are_lengths(survey):

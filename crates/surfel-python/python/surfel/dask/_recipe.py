@@ -1,10 +1,11 @@
 """The description of a scene as it travels: names of files and keywords."""
 
+import json
 import os
 
 import surfel
 from surfel._errors import Error
-from surfel._native import _unread
+from surfel._native import _plain, _unread
 
 
 class VersionMismatch(Error):
@@ -23,12 +24,15 @@ class ClusterLost(Error):
 class Recipe:
     """Files and keywords of `surfel.load`, which are read where they are rendered.
 
-    Relative names start where the recipe is made. Recipes with the same files and keywords are equal.
+    Relative names start where the recipe is made, also those of keywords, as `environment`. Recipes with the same files
+    and keywords are equal.
+
+    Raises `InvalidSetting` for values that no scene file can hold.
     """
 
     def __init__(self, *paths, **keys):
         self.paths = tuple(os.path.abspath(os.fspath(path)) for path in paths)
-        self.keys = keys
+        self.keys = _plain(**keys)
         self.version = surfel.__version__
 
     def scene(self):
@@ -46,7 +50,7 @@ class Recipe:
         return _restored(self.version, tuple(paths), {**self.keys, **keys})
 
     def _identity(self):
-        return repr((self.version, self.paths, sorted(self.keys.items())))
+        return json.dumps((self.version, self.paths, sorted(self.keys.items())))
 
     def __eq__(self, other):
         return isinstance(other, Recipe) and self._identity() == other._identity()
