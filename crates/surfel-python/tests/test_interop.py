@@ -79,6 +79,65 @@ def test_trimesh_meshes_and_clouds_are_added():
     assert len(cloud) == 2500 and (cloud.colors == COLORS * 257).all()
 
 
+def colors_of_mesh(mesh):
+    """Linear red, green and blue of the middle of a box as seen from above."""
+    scene = surfel.Scene(resolution=(9, 9), spp=1, light_samples=1, camera_direction=(0, 0, -1))
+    scene.add(mesh)
+    return scene.render().albedo[4, 4]
+
+
+#: The colour 10, 20, 30 of sRGB in linear numbers.
+LINEAR = [(0.055 + c / 255) ** 2.4 / 1.055**2.4 if c > 10 else c / 255 / 12.92 for c in (10, 20, 30)]
+
+
+def test_trimesh_colours_of_vertices_are_kept():
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box(extents=(2, 2, 2))
+    box.visual.vertex_colors = COLORS[:8].astype("u1")
+    assert numpy.allclose(colors_of_mesh(box), LINEAR, atol=1e-3)
+    scene = surfel.Scene()
+    scene.add(box)
+    # Its edges stay sharp.
+    assert scene.cast_rays([0.9, 0.9, 5, 0, 0, -1])["primitive_normals"].tolist() == [0, 0, 1]
+
+
+def test_pyvista_colours_and_normals_of_vertices_are_kept():
+    pyvista = pytest.importorskip("pyvista")
+    box = pyvista.Box((-1, 1, -1, 1, -1, 1)).triangulate()
+    box.point_data["RGB"] = COLORS[: box.n_points].astype("u1")
+    assert numpy.allclose(colors_of_mesh(box), LINEAR, atol=1e-3)
+    tilted = numpy.tile(numpy.array([0.6, 0, 0.8], "f4"), (box.n_points, 1))
+    box.point_data["Normals"] = tilted
+    scene = surfel.Scene()
+    scene.add(box)
+    assert numpy.allclose(scene.cast_rays([0.1, 0.2, 5, 0, 0, -1])["primitive_normals"], tilted[0])
+
+
+def test_open3d_tensors_are_read():
+    core = pytest.importorskip("open3d").core
+    import open3d
+
+    box = open3d.t.geometry.TriangleMesh.create_box(2, 2, 2)
+    box.vertex.colors = core.Tensor(COLORS[:8].astype("u1"))
+    assert numpy.allclose(colors_of_mesh(box), LINEAR, atol=1e-3)
+    tensors = open3d.t.geometry.PointCloud(core.Tensor(hill_points()))
+    tensors.point.intensity = core.Tensor(numpy.arange(2500.0).reshape(2500, 1))
+    tensors.point.age = core.Tensor(numpy.arange(2500).reshape(2500, 1))
+    cloud = surfel.Cloud(tensors)
+    assert (cloud.intensity == numpy.arange(2500)).all() and (cloud.scalars["age"] == numpy.arange(2500)).all()
+    assert list(cloud.scalars) == ["age"] and cloud.normals is None
+
+
+def test_other_objects_are_refused_with_what_is_taken():
+    class Thing:
+        pass
+
+    words = "points: found an object of type Thing, expected an array .* laspy, Open3D"
+    for take in (surfel.Cloud, surfel.Scene().add):
+        with pytest.raises(surfel.InvalidArray, match=words):
+            take(Thing())
+
+
 def test_pyvista_meshes_and_clouds_are_added():
     pyvista = pytest.importorskip("pyvista")
     scene = surfel.Scene()

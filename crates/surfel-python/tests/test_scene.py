@@ -133,7 +133,7 @@ def test_filters_keep_the_ids_of_the_array(points):
         (SQUARE, {"transform": numpy.diag([numpy.nan, 1, 1, 1])}, surfel.InvalidSetting, "found NaN"),
         (SQUARE, {"parent": "nobody"}, surfel.InvalidSetting, "no object `nobody`"),
         ("nowhere.ply", {}, surfel.MissingFile, "nowhere.ply"),
-        (42, {}, surfel.InvalidArray, "points: found shape"),
+        (42, {}, surfel.InvalidArray, "points: found an object of type int"),
         (object(), {}, surfel.InvalidArray, "points: found"),
     ],
 )

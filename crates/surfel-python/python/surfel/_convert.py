@@ -1,7 +1,9 @@
 """Clouds and meshes of other packages, recognised by what they have; none of the packages is imported."""
 
 from surfel._arrays import as_array
+from surfel._errors import InvalidArray
 
+_PACKAGES = "laspy, Open3D, PyVista, trimesh, pandas or xarray"
 _POSITIONS = ("x", "y", "z")
 _COLORS = ("red", "green", "blue")
 
@@ -12,6 +14,10 @@ def cloud_columns(source):
         columns = reader(source)
         if columns is not None:
             return {name: values for name, values in columns.items() if values is not None}
+    # What has a length may be long, and becomes an array later.
+    if not hasattr(source, "__len__") and as_array("points", source).shape == ():
+        found = f"found an object of type {type(source).__name__}"
+        raise InvalidArray(f"points: {found}, expected an array (N, 3), or what {_PACKAGES} hold")
     return None
 
 
@@ -20,11 +26,20 @@ def mesh_columns(source):
     if _has(source, "vertices", "triangles", "has_triangles"):
         columns = {"vertices": source.vertices, "triangles": source.triangles}
         return columns | _if_filled(normals=source.vertex_normals, colors=source.vertex_colors)
+    if _has(source, "vertex", "triangle") and "positions" in source.vertex and "indices" in source.triangle:
+        vertex, triangle = _tensors(source.vertex), _tensors(source.triangle)
+        columns = {"vertices": vertex["positions"], "triangles": triangle["indices"]}
+        return columns | _if_filled(normals=vertex.get("normals"), colors=vertex.get("colors"))
     if _has(source, "vertices", "faces") and len(source.faces):
-        return {"vertices": source.vertices, "triangles": source.faces}
+        # Normals are computed for any mesh, and would round its edges; colours too, unless they are those of vertices.
+        visual = getattr(source, "visual", None)
+        colors = visual.vertex_colors if getattr(visual, "kind", None) == "vertex" else None
+        return {"vertices": source.vertices, "triangles": source.faces} | _if_filled(colors=colors)
     if _has(source, "points", "faces", "n_cells") and len(source.faces):
-        triangles = source if source.is_all_triangles else source.triangulate()
-        return {"vertices": triangles.points, "triangles": as_array("faces", triangles.faces).reshape(-1, 4)[:, 1:]}
+        mesh = source if source.is_all_triangles else source.triangulate()
+        triangles = as_array("faces", mesh.faces).reshape(-1, 4)[:, 1:]
+        normals, colors, _ = _point_data(mesh)
+        return {"vertices": mesh.points, "triangles": triangles} | _if_filled(normals=normals, colors=colors)
     return None
 
 
@@ -76,18 +91,32 @@ def _open3d_tensor(cloud):
     point = getattr(cloud, "point", None)
     if point is None or "positions" not in point:
         return None
-    column = lambda name: point[name].cpu().numpy() if name in point else None
-    return {name: column(key) for name, key in (("points", "positions"), ("normals", "normals"), ("colors", "colors"))}
+    columns = _tensors(point)
+    result = {name: columns.pop(key, None) for name, key in (("points", "positions"), ("normals", "normals"), ("colors", "colors"))}
+    # Attributes of one number have the shape (N, 1).
+    columns = {name: values.reshape(len(values)) for name, values in columns.items() if values.size == len(values)}
+    result["intensity"] = columns.pop("intensity", columns.pop("intensities", None))
+    return result | {"scalars": columns}
+
+
+def _tensors(attributes):
+    """The attributes of a tensor geometry as arrays."""
+    return {name: attributes[name].cpu().numpy() for name in attributes}
 
 
 def _pyvista(data):
     if not _has(data, "points", "point_data"):
         return None
+    normals, colors, scalars = _point_data(data)
+    return {"points": data.points, "normals": normals, "colors": colors, "scalars": scalars}
+
+
+def _point_data(data):
+    """The normals, the colours, and the other columns of the points of a data set of PyVista."""
     columns = {name: as_array(name, data.point_data[name]) for name in data.point_data.keys()}
     colors = next((columns.pop(name) for name in ("RGB", "RGBA", "rgb", "rgba", "colors") if name in columns), None)
     normals = next((columns.pop(name) for name in ("Normals", "normals") if name in columns), None)
-    scalars = {name: values for name, values in columns.items() if values.ndim == 1}
-    return {"points": data.points, "normals": normals, "colors": colors, "scalars": scalars}
+    return normals, colors, {name: values for name, values in columns.items() if values.ndim == 1}
 
 
 def _trimesh(cloud):
