@@ -22,23 +22,26 @@ pub struct PyImage {
 pub struct Shared {
     image: RenderedImage,
     origin: DVec3,
-    /// Index that each pixel's point had when it was read.
-    point_ids: Vec<u32>,
+    ids: PixelIds,
     choices: Vec<String>,
     positions: OnceLock<Vec<f64>>,
     srgb: OnceLock<Vec<u8>>,
 }
 
+/// What the pixels of a picture lead back to; empty without layers.
+#[derive(Default)]
+pub struct PixelIds {
+    /// Number of the added object that each pixel shows.
+    pub geometries: Vec<u32>,
+    /// Index that each pixel's point had when it was read.
+    pub points: Vec<u32>,
+}
+
 impl PyImage {
     /// A picture whose positions count from `origin`; `choices` are those that were made from the data.
-    pub fn new(
-        image: RenderedImage,
-        origin: DVec3,
-        point_ids: Vec<u32>,
-        choices: Vec<String>,
-    ) -> Self {
+    pub fn new(image: RenderedImage, origin: DVec3, ids: PixelIds, choices: Vec<String>) -> Self {
         let (positions, srgb) = (OnceLock::new(), OnceLock::new());
-        Self { shared: Arc::new(Shared { image, origin, point_ids, choices, positions, srgb }) }
+        Self { shared: Arc::new(Shared { image, origin, ids, choices, positions, srgb }) }
     }
 
     fn shape(&self, n_channels: Option<usize>) -> Vec<usize> {
@@ -124,10 +127,19 @@ impl PyImage {
     #[getter]
     fn point_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.aovs()?;
-        shared_array(py, &self.shared, &self.shared.point_ids, self.shape(None))
+        shared_array(py, &self.shared, &self.shared.ids.points, self.shape(None))
     }
 
-    /// Index of the instance that each pixel shows, 0xFFFFFFFF where nothing was hit: uint32, (height, width).
+    /// The number of what each pixel shows, as `Scene.add` returned it and `Scene.cast_rays` has it; 0xFFFFFFFF where nothing
+    /// was hit: uint32, (height, width).
+    #[getter]
+    fn geometry_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.aovs()?;
+        shared_array(py, &self.shared, &self.shared.ids.geometries, self.shape(None))
+    }
+
+    /// The instance that each pixel shows, in the numbering of .exr files, in which each part of an object is one and hidden
+    /// objects are none; 0xFFFFFFFF where nothing was hit: uint32, (height, width).
     #[getter]
     fn instance_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.layer(py, None, |aovs| &aovs.instance_id)

@@ -1,7 +1,7 @@
 //! Movies.
 
 use crate::errors::{invalid_setting, to_exception};
-use crate::image::PyImage;
+use crate::image::{PixelIds, PyImage};
 use crate::scene::PyScene;
 use crate::threads::{on_threads, start_threads};
 use crate::value::with_keys;
@@ -111,7 +111,7 @@ impl PyFilm {
             let (mut image, origin) = self.frame(index, progress)?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
-            Ok(PyImage::new(image, origin, Vec::new(), Vec::new()))
+            Ok(PyImage::new(image, origin, PixelIds::default(), Vec::new()))
         })
     }
 

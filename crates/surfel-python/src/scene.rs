@@ -4,7 +4,7 @@ use crate::array::{checked, column};
 use crate::buffer::owned_array;
 use crate::errors::{invalid_setting, to_exception};
 use crate::height_map::PyHeightMap;
-use crate::image::PyImage;
+use crate::image::{PixelIds, PyImage};
 use crate::object::NewObject;
 use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
 use crate::rays::{RayArray, RayQuery, ray_hits};
@@ -21,7 +21,7 @@ use surfel::live_view::LiveView;
 use surfel::overlay::faults;
 use surfel::progress_log::Choice;
 use surfel::{Error, RenderedImage, SceneDescription};
-use surfel_core::image::{Image, class_color, class_name};
+use surfel_core::image::{Image, NO_ID, class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::render::uses_rasterizer;
@@ -245,10 +245,10 @@ impl PyScene {
                 return Err(fault.into());
             }
             let (image, _) = scene.picture(view, layers, progress)?;
-            let point_ids = point_ids(view, &image);
+            let ids = pixel_ids(view, &image);
             let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
             let choices = choices.iter().map(line).collect();
-            Ok(PyImage::new(image, view.flat.origin, point_ids, choices))
+            Ok(PyImage::new(image, view.flat.origin, ids, choices))
         })
     }
 
@@ -315,7 +315,7 @@ impl PyScene {
                 (legend, _) => legend.clone(),
             };
             let image = view.finished_with(image, legend);
-            Ok(PyImage::new(image, view.flat.origin, Vec::new(), Vec::new()))
+            Ok(PyImage::new(image, view.flat.origin, PixelIds::default(), Vec::new()))
         })
     }
 
@@ -395,16 +395,19 @@ fn show_background(image: &mut Image, background: Background) {
     }
 }
 
-/// Returns the index that each pixel's point had when it was read.
-fn point_ids(view: &LiveView, image: &RenderedImage) -> Vec<u32> {
-    let Some(aovs) = &image.aovs else { return Vec::new() };
-    let sources = view.sources();
-    let pixels = aovs.instance_id.iter().zip(&aovs.point_id);
+/// Returns what each pixel leads back to.
+fn pixel_ids(view: &LiveView, image: &RenderedImage) -> PixelIds {
+    let Some(aovs) = &image.aovs else { return PixelIds::default() };
+    let (contents, sources) = (view.contents(), view.sources());
+    let content = |instance: &u32| contents.get(*instance as usize).copied().unwrap_or(NO_ID);
     let source = |(instance, id): (&u32, &u32)| {
         let source = || sources.get(*instance as usize)?.get(*id as usize).copied();
         source().unwrap_or(*id)
     };
-    pixels.map(source).collect()
+    PixelIds {
+        geometries: aovs.instance_id.iter().map(content).collect(),
+        points: aovs.instance_id.iter().zip(&aovs.point_id).map(source).collect(),
+    }
 }
 
 fn scene_of_text(py: Python<'_>, text: &str) -> PyResult<SceneDescription> {

@@ -24,6 +24,7 @@ def test_layers_have_their_shapes_and_are_not_copied(image):
         "normal": ((48, 64, 3), "f4"),
         "position": ((48, 64, 3), "f8"),
         "point_ids": ((48, 64), "u4"),
+        "geometry_ids": ((48, 64), "u4"),
         "instance_ids": ((48, 64), "u4"),
         "albedo": ((48, 64, 3), "f4"),
         "support_count": ((48, 64), "u4"),
@@ -53,6 +54,23 @@ def test_point_ids_are_rows_of_the_file(hill, image):
     distances = numpy.linalg.norm(rows[image.point_ids[hit]] - image.position[hit], axis=-1)
     # Neighbouring points are 0.04 apart; at the rim the surface ends a radius behind the last of them.
     assert numpy.median(distances) < 0.03 and distances.max() < 0.12
+
+
+def test_pixels_name_what_was_added(hill):
+    scene = surfel.load(hill, **SMALL)
+    square = surfel.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    hidden, shown = scene.add(square, visible=False, translate=(0, 0, 5)), scene.add(square, translate=(3, 0, 0))
+    image = scene.render(camera_direction=(0, 0, -1))
+    assert (hidden, shown) == (1, 2)
+    assert set(numpy.unique(image.geometry_ids)) == {0, 2, 0xFFFFFFFF}
+    assert ((image.geometry_ids == 0xFFFFFFFF) == (image.point_ids == 0xFFFFFFFF)).all()
+    assert (image.position[image.geometry_ids == 2][:, 0] > 1.9).all()
+    down = numpy.zeros((*image.geometry_ids.shape, 6))
+    down[..., :3], down[..., 5] = image.position + [0, 0, 9], -1
+    seen = image.geometry_ids == 2
+    assert (scene.cast_rays(down)["geometry_ids"][seen] == 2).all()
+    with pytest.raises(AttributeError, match="layers=False"):
+        scene.render(layers=False).geometry_ids
 
 
 def test_layers_live_longer_than_their_picture(hill):
