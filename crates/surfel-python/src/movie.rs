@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use surfel::animate::{PlannedMovie, movie_options, render_frame};
 use surfel::description::Invalid;
 use surfel::{BuiltScene, RenderedImage};
@@ -133,7 +133,7 @@ impl PyFilm {
 
     /// Renders a frame; returns it with the origin of its positions.
     fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<(RenderedImage, DVec3)> {
-        let mut scene = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scene = work::locked(&self.scene, progress)?;
         let (scene, time_secs) = (&mut *scene, f64::from(index) / self.options.fps);
         let image = on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
         Ok((image, scene.flat().origin))

@@ -1,9 +1,9 @@
 //! Scenes whose files are read, and their views.
 
 use crate::threads::{on_threads, start_threads};
+use crate::work::locked;
 use rayon::ThreadPool;
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
@@ -30,9 +30,6 @@ pub struct ChosenView {
     pub view: LiveView,
     pub choices: Vec<Choice>,
 }
-
-/// Time between two looks at a scene that another thread reads.
-const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl OpenScene {
     /// Reads the files of a description.
@@ -78,16 +75,7 @@ pub fn opened(
     description: &SceneDescription,
     progress: &dyn Progress,
 ) -> surfel::Result<Arc<OpenScene>> {
-    let mut slot = loop {
-        match slot.try_lock() {
-            Ok(slot) => break slot,
-            Err(TryLockError::Poisoned(error)) => break error.into_inner(),
-            Err(TryLockError::WouldBlock) => {
-                progress.check()?;
-                std::thread::sleep(LOCK_POLL_INTERVAL);
-            }
-        }
-    };
+    let mut slot = locked(slot, progress)?;
     if let Some(scene) = &*slot {
         return Ok(scene.clone());
     }

@@ -1,5 +1,6 @@
 """Threads, processes, signals and progress while work goes on."""
 
+import _thread
 import multiprocessing
 import os
 import signal
@@ -149,6 +150,23 @@ except KeyboardInterrupt:
     seconds, processor_seconds = map(float, program.stdout.split())
     # Others may keep this machine busy, so that the time counts that the work itself takes after the signal.
     assert processor_seconds < 0.1 and seconds < 1.0, (seconds, processor_seconds, program.stderr)
+
+
+def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
+    film = surfel.Film(surfel.load(hill), frames=2, turntable=1, threads=1, resolution=(320, 240), spp=16, light_samples=16)
+    rendering = threading.Thread(target=lambda: film.render(0))
+    rendering.start()
+    time.sleep(0.2)
+    # Programs that a shell has put in the background ignore the signal.
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Timer(0.2, _thread.interrupt_main).start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            film.render(1)
+        assert rendering.is_alive()
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        rendering.join()
 
 
 def render_in_child(queue):
