@@ -2,12 +2,17 @@
 
 use crate::array::{checked, column, positions, scaled_positions, singles, vectors};
 use crate::buffer::{Element, owned_array, shared_array};
-use crate::errors::{invalid_array, to_exception};
+use crate::errors::{invalid_array, invalid_setting, to_exception};
+use crate::height_map::epsg_name;
+use crate::value::to_value;
 use crate::work;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use surfel::SceneDescription;
+use surfel::crs::CoordinateSystem;
+use surfel::memory_files::MemoryContent;
 use surfel_core::image::decode_srgb;
 use surfel_core::math::{DVec3, Vec3, Vec4};
 use surfel_core::points::{PointCloud, Scalar, Values};
@@ -30,6 +35,11 @@ impl PyCloud {
         Self { cloud: Arc::new(cloud), options }
     }
 
+    /// Returns the cloud as content of a scene.
+    pub fn content(&self) -> MemoryContent {
+        MemoryContent::Points(self.cloud.clone(), self.options.coordinate_system.clone())
+    }
+
     fn optional<'py, E: Element>(
         &self,
         py: Python<'py>,
@@ -48,13 +58,15 @@ impl PyCloud {
     ///
     /// `points`: (N, 3), any numbers; rows that are not finite count as not measured. `normals`: (N, 3), any length.
     /// `radii`: (N,) or a number, in the unit of the positions. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0
-    /// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,).
+    /// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,). `crs`: the coordinate
+    /// system, as `EPSG:25832`, 25832, WKT, or one of pyproj.
     ///
     /// Positions are copied once, to float32 about `origin`, which keeps the resolution of georeferenced coordinates.
-    /// Later changes of the arrays change nothing here. Raises `InvalidArray`.
+    /// Later changes of the arrays change nothing here. Raises `InvalidArray`, and `InvalidSetting` for an unknown `crs`.
     #[new]
     #[pyo3(signature = (
-        points, *, normals = None, radii = None, colors = None, intensity = None, classification = None, scalars = None
+        points, *, normals = None, radii = None, colors = None, intensity = None, classification = None, scalars = None,
+        crs = None
     ))]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn from_arrays(
@@ -66,6 +78,7 @@ impl PyCloud {
         intensity: Option<&Bound<'_, PyAny>>,
         classification: Option<&Bound<'_, PyAny>>,
         scalars: Option<&Bound<'_, PyDict>>,
+        crs: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let found = py.import("surfel._convert")?.call_method1("cloud_columns", (points,))?;
         let columns = match found.is_none() {
@@ -89,8 +102,12 @@ impl PyCloud {
         for one in [columns.get_item("scalars")?.as_ref(), scalars.map(|dict| &**dict)] {
             one.map_or(Ok(()), |one| all.update(one.cast()?))?;
         }
+        let coordinate_system = match crs {
+            Some(crs) => Some(coordinate_system(crs)?),
+            None => columns.get_item("crs")?.map(|crs| crs.extract()).transpose()?,
+        };
         let cloud = cloud_of(py, &columns, &all)?;
-        Ok(Self::new(cloud, SaveOptions::default()))
+        Ok(Self::new(cloud, SaveOptions { coordinate_system, ..SaveOptions::default() }))
     }
 
     fn __len__(&self) -> usize {
@@ -117,6 +134,15 @@ impl PyCloud {
     fn local_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let numbers = bytemuck::cast_slice::<Vec3, f32>(&self.cloud.positions);
         shared_array(py, &self.cloud, numbers, vec![self.cloud.len(), 3])
+    }
+
+    /// The coordinate system as `EPSG:25832`, or with one of heights as `EPSG:25832+7837`; as WKT if it has no code, and
+    /// `None` if it is not known.
+    #[getter]
+    fn crs(&self) -> Option<String> {
+        let text = self.options.coordinate_system.as_ref()?;
+        let codes = CoordinateSystem::parse(text).and_then(|system| system.epsg());
+        Some(codes.map_or_else(|| text.clone(), epsg_name))
     }
 
     /// Unit normals: float32, (N, 3), or `None`.
@@ -189,6 +215,16 @@ impl PyCloud {
     fn __repr__(&self) -> String {
         format!("<surfel.Cloud of {}>", counted(self.cloud.len(), "point"))
     }
+}
+
+/// Reads a coordinate system as the key `crs` does.
+fn coordinate_system(crs: &Bound<'_, PyAny>) -> PyResult<String> {
+    let py = crs.py();
+    let text = py.import("surfel._convert")?.call_method1("crs_text", (crs,))?;
+    let mut read = SceneDescription::default();
+    read.set("crs", &to_value("crs", &text)?, Path::new(""))
+        .map_err(|error| invalid_setting(py, error))?;
+    Ok(read.world.crs.unwrap_or_default())
 }
 
 fn cloud_of(

@@ -5,7 +5,7 @@ use crate::work;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
-use surfel_formats::{Georeference, HeightMap, save_height_map};
+use surfel_formats::{EpsgCodes, Georeference, HeightMap, save_height_map};
 
 /// Elevations of a plan. Row 0 is the top; the array is read-only and shared with the map.
 #[pyclass(frozen, module = "surfel", name = "HeightMap")]
@@ -31,9 +31,7 @@ impl PyHeightMap {
     /// The coordinate system as `EPSG:25832`, or with one of heights as `EPSG:25832+7837`; None if it has no code.
     #[getter]
     fn crs(&self) -> Option<String> {
-        let epsg = self.0.georeference.epsg?;
-        let vertical = epsg.vertical.map_or(String::new(), |code| format!("+{code}"));
-        Some(format!("EPSG:{}{vertical}", epsg.horizontal))
+        self.0.georeference.epsg.map(epsg_name)
     }
 
     /// Writes the elevations as a GeoTIFF (.tif), in which -9999 stands for NaN. The file is replaced once it is complete.
@@ -47,4 +45,10 @@ impl PyHeightMap {
     fn __repr__(&self) -> String {
         format!("<surfel.HeightMap {}x{}>", self.0.width, self.0.height)
     }
+}
+
+/// Returns the name of a coordinate system: `EPSG:25832`, or with one of heights `EPSG:25832+7837`.
+pub fn epsg_name(codes: EpsgCodes) -> String {
+    let vertical = codes.vertical.map_or(String::new(), |code| format!("+{code}"));
+    format!("EPSG:{}{vertical}", codes.horizontal)
 }

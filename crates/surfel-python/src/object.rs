@@ -98,7 +98,7 @@ fn matrix(transform: &Bound<'_, PyAny>) -> PyResult<Value> {
 fn content(what: &Bound<'_, PyAny>) -> PyResult<MemoryContent> {
     let py = what.py();
     if let Ok(cloud) = what.cast::<PyCloud>() {
-        return Ok(MemoryContent::Points(cloud.get().cloud.clone()));
+        return Ok(cloud.get().content());
     }
     if let Ok(mesh) = what.cast::<PyMesh>() {
         return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
@@ -108,5 +108,5 @@ fn content(what: &Bound<'_, PyAny>) -> PyResult<MemoryContent> {
         return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
     }
     let cloud = py.get_type::<PyCloud>().call1((what,))?.cast_into::<PyCloud>()?;
-    Ok(MemoryContent::Points(cloud.get().cloud.clone()))
+    Ok(cloud.get().content())
 }

@@ -69,6 +69,35 @@ def test_coordinates_are_a_copy_that_may_be_changed(points):
         cloud.local_points[0] = 0
 
 
+@pytest.mark.parametrize("crs", ["EPSG:25832", "25832", 25832, numpy.int64(25832)])
+def test_clouds_have_coordinate_systems(crs):
+    points = hill_points(offset=(691000, 5334000, 500))
+    cloud = surfel.Cloud(points, crs=crs)
+    assert cloud.crs == "EPSG:25832" and surfel.Cloud(points).crs is None
+    scene = surfel.Scene(resolution=(32, 24), spp=1, light_samples=1, gsd=0.1)
+    scene.add(cloud)
+    scene.add(cloud, translate=(3, 0, 0))
+    assert scene.height_map().crs == "EPSG:25832"
+    scene.render(sun="2026-06-21T15:00+02:00")
+    assert surfel.prepare(cloud, subsample="random:100").crs == "EPSG:25832"
+
+
+def test_coordinate_systems_of_files_stay(tmp_path):
+    points = hill_points(offset=(691000, 5334000, 500))
+    surfel.Cloud(points, crs="EPSG:25832").save(tmp_path / "hill.laz")
+    cloud = surfel.prepare(tmp_path / "hill.laz", filter="z > 500.1")
+    assert cloud.crs == "EPSG:25832"
+    scene = surfel.Scene(gsd=0.1)
+    scene.add(cloud)
+    assert scene.height_map().crs == "EPSG:25832"
+
+
+def test_unknown_coordinate_systems_are_refused(points):
+    for crs in ("EPSG:99999", "Munich", 7, [1]):
+        with pytest.raises(surfel.InvalidSetting, match="crs: .*expected"):
+            surfel.Cloud(points, crs=crs)
+
+
 def test_integers_are_taken(points):
     cloud = surfel.Cloud((points * 1000).astype("i2"))
     assert (cloud.points == (points * 1000).astype("i2")).all()

@@ -27,6 +27,24 @@ def test_laspy_coordinates_are_exact(tmp_path):
     assert numpy.isfinite(scene.render().depth).any()
 
 
+def test_laspy_coordinate_systems_are_kept(tmp_path):
+    laspy, pyproj = pytest.importorskip("laspy"), pytest.importorskip("pyproj")
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = hill_points(offset=(691000, 5334000, 500)).T
+    assert surfel.Cloud(las).crs is None
+    header.add_crs(pyproj.CRS("EPSG:25832"))
+    assert surfel.Cloud(las).crs == "EPSG:25832"
+    las.write(tmp_path / "hill.las")
+    assert surfel.Cloud(laspy.read(tmp_path / "hill.las")).crs == "EPSG:25832"
+    for system in (pyproj.CRS("EPSG:31468"), pyproj.CRS(pyproj.CRS("EPSG:31468").to_wkt())):
+        assert surfel.Cloud(las, crs=system).crs == "EPSG:31468"
+    unnamed = pyproj.CRS("+proj=utm +zone=32 +ellps=GRS80 +units=m")
+    scene = surfel.Scene(resolution=(32, 24), spp=1, light_samples=1)
+    scene.add(surfel.Cloud(las, crs=unnamed))
+    scene.render(sun="2026-06-21T15:00+02:00")
+
+
 def test_laspy_points_are_read_as_their_file():
     laspy = pytest.importorskip("laspy")
     las = laspy.LasData(laspy.LasHeader(version="1.2", point_format=2))

@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn objects_in_memory_that_the_start_lacks_are_added() {
-        let content = || MemoryContent::Points(Arc::new(PointCloud::default()));
+        let content = || MemoryContent::Points(Arc::new(PointCloud::default()), None);
         let objects = vec![object("a.ply"), object("memory-b")];
         let mut startup = SceneDescription { objects, ..SceneDescription::default() };
         startup.memory.insert("memory-b", content());

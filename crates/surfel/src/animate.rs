@@ -276,7 +276,7 @@ mod tests {
         let mut cloud = PointCloud::from_positions((0..400).map(corner).collect());
         cloud.colors = Some(vec![[brightness; 3]; 400]);
         let mut description = SceneDescription::of_files(["memory:square"]);
-        let content = MemoryContent::Points(Arc::new(cloud));
+        let content = MemoryContent::Points(Arc::new(cloud), None);
         description.memory.insert("memory:square", content);
         description
     }

@@ -14,8 +14,8 @@ pub struct MemoryFiles(BTreeMap<PathBuf, MemoryContent>);
 /// A cloud or a mesh in memory. Content is equal if it is the same.
 #[derive(Clone, Debug)]
 pub enum MemoryContent {
-    /// A point cloud.
-    Points(Arc<PointCloud>),
+    /// A point cloud, with its coordinate system as WKT or as "EPSG:" and a code, if that is known.
+    Points(Arc<PointCloud>, Option<String>),
     /// A triangle mesh.
     Triangles(Arc<Mesh>),
     /// All that was read of a file.
@@ -63,7 +63,7 @@ impl MemoryContent {
     /// Returns a copy as a graph, as reading a file does.
     pub(crate) fn to_graph(&self) -> Graph<PointCloud> {
         let geometry = match self {
-            Self::Points(cloud) => Geometry::Points(PointCloud::clone(cloud)),
+            Self::Points(cloud, _) => Geometry::Points(PointCloud::clone(cloud)),
             Self::Triangles(mesh) => Geometry::Triangles(Mesh::clone(mesh)),
             Self::File(file) => return file.graph.clone(),
         };
@@ -73,7 +73,9 @@ impl MemoryContent {
     /// Returns a text that changes with the clouds and meshes, their places and materials.
     pub(crate) fn fingerprint(&self) -> String {
         match self {
-            Self::Points(cloud) => points_fingerprint(cloud),
+            Self::Points(cloud, system) => {
+                format!("{} {system:?}", points_fingerprint(cloud))
+            }
             Self::Triangles(mesh) => mesh_fingerprint(mesh),
             Self::File(file) => {
                 let Graph { geometries, materials, nodes, .. } = &file.graph;
@@ -90,8 +92,9 @@ impl MemoryContent {
     pub(crate) fn info(&self) -> FileInfo {
         let info = FileInfo { format: "in memory".into(), ..FileInfo::default() };
         match self {
-            Self::Points(cloud) => FileInfo {
+            Self::Points(cloud, system) => FileInfo {
                 n_points: Some(cloud.len() as u64),
+                coordinate_system: system.clone(),
                 columns: column_names(cloud),
                 ..info
             },
@@ -108,7 +111,9 @@ impl MemoryContent {
 impl PartialEq for MemoryContent {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Points(a), Self::Points(b)) => Arc::ptr_eq(a, b),
+            (Self::Points(a, system), Self::Points(b, other)) => {
+                Arc::ptr_eq(a, b) && system == other
+            }
             (Self::Triangles(a), Self::Triangles(b)) => Arc::ptr_eq(a, b),
             (Self::File(a), Self::File(b)) => Arc::ptr_eq(a, b),
             _ => false,
@@ -152,7 +157,7 @@ mod tests {
     fn objects_of_one_name_share_a_geometry() {
         let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
         let cloud = Arc::new(PointCloud::from_positions((0..400).map(corner).collect()));
-        let content = MemoryContent::Points(cloud);
+        let content = MemoryContent::Points(cloud, None);
         let mut description = SceneDescription::default();
         description.memory.insert("memory:square", content.clone());
         assert_eq!(description.memory.name_of(&content), Some(Path::new("memory:square")));

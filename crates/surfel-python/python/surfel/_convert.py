@@ -43,6 +43,14 @@ def mesh_columns(source):
     return None
 
 
+def crs_text(crs):
+    """A coordinate system as a code or as WKT: that of pyproj, others as they are."""
+    if _has(crs, "to_epsg", "to_wkt"):
+        code = crs.to_epsg()
+        return f"EPSG:{code}" if code else crs.to_wkt("WKT1_GDAL")
+    return str(crs) if hasattr(crs, "__index__") else crs
+
+
 def _has(source, *names):
     return all(hasattr(source, name) for name in names)
 
@@ -65,12 +73,26 @@ def _laspy(las):
         "intensity": columns.pop("intensity", None),
         "classification": columns.pop("classification", None),
         "scalars": {name: values for name, values in columns.items() if values.ndim == 1},
+        "crs": _laspy_crs(placed),
     }
     if all(name in las.point_format.dimension_names for name in _COLORS):
         colors = _stacked([as_array(name, las[name]) for name in _COLORS])
         # Files whose colours have eight bits hold nothing above 255.
         result["colors"] = colors.astype("u1") if colors.size and colors.max() <= 255 else colors
     return result
+
+
+def _laspy_crs(header):
+    """The coordinate system as the file has it in WKT, or by its GeoTIFF keys where pyproj is installed."""
+    records = [*getattr(header, "vlrs", ()), *(getattr(header, "evlrs", None) or ())]
+    texts = [record.string.rstrip("\0") for record in records if type(record).__name__ == "WktCoordinateSystemVlr"]
+    if texts:
+        return texts[0]
+    try:
+        return crs_text(header.parse_crs())
+    except Exception:
+        # Without pyproj, of a record of points, or for keys that it does not understand.
+        return None
 
 
 def _integers(axis):

@@ -81,7 +81,7 @@ fn an_added_object_joins_the_scene_and_leaves_it() {
     let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 50.0);
     let cloud = PointCloud::from_positions((0..400).map(corner).collect());
     let mut more = description.clone();
-    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
+    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud), None));
     more.objects.push(ObjectDescription::new("memory:more"));
     assert_eq!(n_instances(&more), 2);
     // The points of the start are prepared once for both.
@@ -101,7 +101,7 @@ fn an_added_object_leaves_the_trees_of_the_others() {
     let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 5.0);
     let cloud = PointCloud::from_positions((0..400).map(corner).collect());
     let mut more = description.clone();
-    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
+    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud), None));
     more.objects.push(ObjectDescription::new("memory:more"));
     let second = scene.view(&more, &NoProgress).unwrap();
     let is_same = |a: &LiveView, b: &LiveView, i: usize| {

@@ -52,7 +52,9 @@ pub fn import(
     };
     match content {
         // Rays that meet them are in their coordinates.
-        Some(MemoryContent::Points(cloud)) => report_degrees(cloud, progress),
+        Some(MemoryContent::Points(cloud, system)) => {
+            report_degrees(cloud, system.as_deref(), progress);
+        }
         _ if settings.preparation.reproject() => return Ok(with_metres(loaded, options, progress)),
         _ => {}
     }
@@ -60,8 +62,8 @@ pub fn import(
 }
 
 /// Warns of points in memory whose coordinates look like degrees.
-fn report_degrees(cloud: &PointCloud, progress: &dyn Progress) {
-    if is_in_degrees(cloud, None) {
+fn report_degrees(cloud: &PointCloud, system: Option<&str>, progress: &dyn Progress) {
+    if is_in_degrees(cloud, system) {
         progress.note(&format!(
             "{LOOKS_LIKE_DEGREES}, z like metres; reproject the points to a system in metres first, with pyproj for example"
         ));
@@ -424,7 +426,7 @@ mod tests {
         cloud.origin = DVec3::new(11.57, 48.13, 520.0);
         let file = FileContent { graph: graph_of(cloud.clone()), info: FileInfo::default() };
         let contents =
-            [MemoryContent::File(Arc::new(file)), MemoryContent::Points(Arc::new(cloud))];
+            [MemoryContent::File(Arc::new(file)), MemoryContent::Points(Arc::new(cloud), None)];
         let origins_and_notes = contents.map(|content| {
             let mut options = ImportOptions::default();
             options.memory.insert("scan", content);

@@ -54,7 +54,7 @@ mod tests {
             let mut cloud = PointCloud::from_positions((0..81).map(corner).collect());
             cloud.classification = Some((0..81).map(|n| [2, *class][n % 2]).collect());
             let name = format!("memory:{i}");
-            description.memory.insert(&name, MemoryContent::Points(Arc::new(cloud)));
+            description.memory.insert(&name, MemoryContent::Points(Arc::new(cloud), None));
             let mut table = keys.as_object().unwrap().clone();
             table.insert("file".into(), json!(name));
             description.add_object(&table, Path::new("")).unwrap();

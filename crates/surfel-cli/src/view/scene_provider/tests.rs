@@ -23,7 +23,7 @@ fn startup() -> SceneDescription {
     let mut startup = SceneDescription::of_files(["memory:0:mesh", "memory:1:cloud"]);
     let memory = &mut startup.memory;
     memory.insert("memory:0:mesh", MemoryContent::Triangles(Arc::new(mesh)));
-    memory.insert("memory:1:cloud", MemoryContent::Points(Arc::new(cloud)));
+    memory.insert("memory:1:cloud", MemoryContent::Points(Arc::new(cloud), None));
     startup
 }
 
