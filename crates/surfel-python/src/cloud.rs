@@ -217,6 +217,14 @@ impl PyCloud {
     }
 }
 
+/// Returns a cloud, which is made of an array or of a cloud of another package.
+pub fn to_cloud<'py>(source: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyCloud>> {
+    match source.cast::<PyCloud>() {
+        Ok(cloud) => Ok(cloud.clone()),
+        Err(_) => Ok(source.py().get_type::<PyCloud>().call1((source,))?.cast_into()?),
+    }
+}
+
 /// Reads a coordinate system as the key `crs` does.
 fn coordinate_system(crs: &Bound<'_, PyAny>) -> PyResult<String> {
     let py = crs.py();

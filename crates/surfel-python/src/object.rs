@@ -1,6 +1,6 @@
 //! Objects of a scene: content with a name, a place, a material and settings of its own.
 
-use crate::cloud::{PyCloud, PyMesh, mesh_columns};
+use crate::cloud::{PyCloud, PyMesh, mesh_columns, to_cloud};
 use crate::errors::{invalid_array, invalid_setting, to_exception};
 use crate::value::{table, to_value};
 use pyo3::prelude::*;
@@ -97,16 +97,12 @@ fn matrix(transform: &Bound<'_, PyAny>) -> PyResult<Value> {
 /// Returns the content of a cloud or mesh, of ours or of another package.
 fn content(what: &Bound<'_, PyAny>) -> PyResult<MemoryContent> {
     let py = what.py();
-    if let Ok(cloud) = what.cast::<PyCloud>() {
-        return Ok(cloud.get().content());
-    }
     if let Ok(mesh) = what.cast::<PyMesh>() {
         return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
     }
-    if mesh_columns(py, what)?.is_some() {
+    if !what.is_instance_of::<PyCloud>() && mesh_columns(py, what)?.is_some() {
         let mesh = py.get_type::<PyMesh>().call1((what,))?.cast_into::<PyMesh>()?;
         return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
     }
-    let cloud = py.get_type::<PyCloud>().call1((what,))?.cast_into::<PyCloud>()?;
-    Ok(cloud.get().content())
+    Ok(to_cloud(what)?.get().content())
 }

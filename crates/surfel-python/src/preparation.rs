@@ -1,6 +1,6 @@
 //! Clouds that are prepared and kept.
 
-use crate::cloud::PyCloud;
+use crate::cloud::{PyCloud, to_cloud};
 use crate::errors::invalid_setting;
 use crate::threads::{on_threads, start_threads};
 use crate::value::with_keys;
@@ -16,9 +16,10 @@ use surfel::prepare::{PrepareOptions, prepare_files, prepare_points};
 use surfel::progress_log::ProgressLog;
 use surfel::{Choice, SceneDescription};
 use surfel_core::points::PointCloud;
-use surfel_formats::{FileInfo, Loaded, SaveOptions};
+use surfel_core::progress::Progress;
+use surfel_formats::{ColumnChoice, FileInfo, LoadOptions, Loaded, SaveOptions, merge_loaded};
 
-/// Cleans a cloud, and adds normals and radii: of a file, of several that become one, or of a `Cloud`.
+/// Cleans a cloud, and adds normals and radii: of a file, of a `Cloud` or what `Cloud` takes, or of several that become one.
 ///
 /// Keywords are the keys of preparation in scene files: `filter`, `crop`, `subsample`, `remove_outliers`, `denoise`, `orient`,
 /// `normals_k`, `radius` and others, besides `seed`, `threads` and `memory_limit`. Without any, normals and radii are added;
@@ -26,7 +27,7 @@ use surfel_formats::{FileInfo, Loaded, SaveOptions};
 /// `surface_variation`. Coordinates in degrees of longitude and latitude stay, with a warning, unless `reproject=True` moves
 /// them to metres. `progress` is called as `progress(stage, done, total)`.
 ///
-/// Raises `InvalidSetting`, `MissingFile`, `InvalidFile`, `InvalidScene`.
+/// Raises `InvalidSetting`, `InvalidArray`, `MissingFile`, `InvalidFile`, `InvalidScene`.
 #[pyfunction]
 #[pyo3(signature = (*sources, normals = false, keep_variation = false, progress = None, **keys))]
 pub fn prepare(
@@ -40,16 +41,16 @@ pub fn prepare(
     let description = with_keys(py, &SceneDescription::default(), keys)?;
     check_keys(&description).map_err(|error| invalid_setting(py, error))?;
     let options = PrepareOptions { normals, keep_variation };
-    let source = Source::new(&sources)?;
+    let sources = sources.iter().map(Source::new).collect::<PyResult<Vec<_>>>()?;
     let (prepared, choices) = work::run(py, progress, |progress| {
         let threads = start_threads(&description.run)?;
         let log = ProgressLog::new(progress);
-        let prepared = on_threads(threads.as_ref(), || match source {
-            Source::Cloud(cloud, info) => {
-                let loaded = Loaded { cloud: Arc::unwrap_or_clone(cloud), info: *info };
+        let prepared = on_threads(threads.as_ref(), || match files(&sources) {
+            Some(files) => prepare_files(&files, &description, options, &log),
+            None => {
+                let loaded = merged(sources, &description, &log)?;
                 prepare_points(loaded, &description, options, &log)
             }
-            Source::Files(files) => prepare_files(&files, &description, options, &log),
         })?;
         Ok((prepared, log.into_choices()))
     })?;
@@ -69,23 +70,55 @@ fn warn(py: Python<'_>, choices: &[Choice]) -> PyResult<()> {
     Ok(())
 }
 
-/// The points that are prepared: a cloud, or those of files.
+/// Points that are prepared: a cloud, or those of a file.
 enum Source {
     Cloud(Arc<PointCloud>, Box<FileInfo>),
-    Files(Vec<PathBuf>),
+    File(PathBuf),
 }
 
 impl Source {
-    fn new(sources: &[Bound<'_, PyAny>]) -> PyResult<Self> {
-        if let [only] = sources
-            && let Ok(cloud) = only.cast::<PyCloud>()
-        {
-            let cloud = cloud.get();
-            return Ok(Self::Cloud(cloud.cloud.clone(), Box::new(info(&cloud.options))));
+    fn new(source: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = source.extract::<PathBuf>() {
+            return Ok(Self::File(path));
         }
-        let files = sources.iter().map(|source| source.extract::<PathBuf>());
-        Ok(Self::Files(files.collect::<PyResult<_>>()?))
+        let cloud = to_cloud(source)?;
+        let cloud = cloud.get();
+        Ok(Self::Cloud(cloud.cloud.clone(), Box::new(info(&cloud.options))))
     }
+}
+
+/// Returns the files, if all sources are files.
+fn files(sources: &[Source]) -> Option<Vec<PathBuf>> {
+    let file = |source: &Source| match source {
+        Source::File(file) => Some(file.clone()),
+        Source::Cloud(..) => None,
+    };
+    sources.iter().map(file).collect()
+}
+
+/// Reads sources as one cloud, with all points: they are filtered when they are prepared.
+fn merged(
+    sources: Vec<Source>,
+    description: &SceneDescription,
+    progress: &dyn Progress,
+) -> surfel::Result<Loaded> {
+    let preparation = &description.objects_default.preparation;
+    let options = preparation.load_options(ColumnChoice::All)?;
+    let options = LoadOptions { filter: None, ..options };
+    let (mut parts, mut names) = (Vec::new(), Vec::new());
+    for source in sources {
+        match source {
+            Source::Cloud(cloud, info) => {
+                names.push(PathBuf::from(format!("cloud {}", names.len())));
+                parts.push(Loaded { cloud: Arc::unwrap_or_clone(cloud), info: *info });
+            }
+            Source::File(file) => {
+                parts.push(surfel_formats::load(&file, &options, progress)?);
+                names.push(file);
+            }
+        }
+    }
+    Ok(merge_loaded(parts, &names, progress))
 }
 
 /// Returns what the properties of a saved cloud tell about the file that it came from.

@@ -42,6 +42,16 @@ def test_several_files_become_one_cloud(hill):
     assert len(surfel.prepare(hill, hill, duplicates="keep")) == 5000
 
 
+def test_files_clouds_and_arrays_become_one_cloud(hill, points):
+    above, n_high = points + [0, 0, 3], (points[:, 2] > 0.2).sum()
+    for sources in ((surfel.Cloud(points), surfel.Cloud(above)), (hill, above), (above, hill, above)):
+        cloud = surfel.prepare(*sources, duplicates="keep", filter="z > 0.2")
+        assert len(cloud) == n_high + 2500 * (len(sources) - 1)
+    assert len(surfel.prepare(points)) == 2500
+    with pytest.raises(surfel.InvalidArray, match="object of type object, expected an array"):
+        surfel.prepare(hill, object())
+
+
 def test_degrees_are_moved_on_request_and_warned_of_otherwise():
     angles = numpy.arange(900)
     degrees = [11.57 + 1e-4 * (angles % 30), 48.13 + 1e-4 * (angles // 30), angles % 17]

@@ -144,7 +144,7 @@ class Viewer:
 
 def load(*paths: Path, progress: Progress = None, **keys: Any) -> Scene: ...
 def prepare(
-    *sources: Path | Cloud, normals: bool = False, keep_variation: bool = False, progress: Progress = None, **keys: Any
+    *sources: Any, normals: bool = False, keep_variation: bool = False, progress: Progress = None, **keys: Any
 ) -> Cloud: ...
 def animate(
     scene: Scene,
