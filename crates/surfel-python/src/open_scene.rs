@@ -1,8 +1,6 @@
 //! Scenes whose files are read, and their views.
 
-use crate::threads::{on_threads, start_threads};
 use crate::work::locked;
-use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::live_scene::{LiveScene, UseCase};
@@ -18,8 +16,9 @@ pub type SceneSlot = Arc<Mutex<Option<Arc<OpenScene>>>>;
 pub struct OpenScene {
     /// The files' content.
     pub scene: LiveScene,
-    /// Threads of the scene, if it has a number of its own.
-    threads: Option<ThreadPool>,
+    /// Held by those who work on the scene's own threads. One does at a time: a thread that waits inside its work would take
+    /// up another's, which may wait for a lock that the first holds.
+    turn: Mutex<()>,
     /// The view of the last description, and the choices that were made for it.
     last: Mutex<Option<Arc<ChosenView>>>,
 }
@@ -34,10 +33,8 @@ pub struct ChosenView {
 impl OpenScene {
     /// Reads the files of a description.
     pub fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
-        let threads = start_threads(&description.run)?;
-        let open = || LiveScene::open(description, UseCase::Pictures, progress);
-        let scene = on_threads(threads.as_ref(), open)?;
-        Ok(Self { scene, threads, last: Mutex::default() })
+        let scene = LiveScene::open(description, UseCase::Pictures, progress)?;
+        Ok(Self { scene, turn: Mutex::default(), last: Mutex::default() })
     }
 
     /// Returns the view under a description, which is made unless it is the last one.
@@ -56,16 +53,22 @@ impl OpenScene {
         if applied.materials != self.scene.startup().materials {
             check_files(&applied)?;
         }
-        let view = self.install(|scene| scene.view(&applied, &log))?;
+        let view = self.install(progress, |scene| scene.view(&applied, &log))?;
         let choices = log.into_choices();
         let view = Arc::new(ChosenView { description, view, choices });
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
         Ok(view)
     }
 
-    /// Runs `work` on the scene's threads.
-    pub fn install<T: Send>(&self, work: impl FnOnce(&LiveScene) -> T + Send) -> T {
-        on_threads(self.threads.as_ref(), || work(&self.scene))
+    /// Runs `work` on the scene's threads, if it has a number of its own.
+    pub fn install<T: Send>(
+        &self,
+        progress: &dyn Progress,
+        work: impl FnOnce(&LiveScene) -> surfel::Result<T> + Send,
+    ) -> surfel::Result<T> {
+        let has_threads = self.scene.startup().run.threads.is_some();
+        let _turn = has_threads.then(|| locked(&self.turn, progress)).transpose()?;
+        self.scene.install(|| work(&self.scene))
     }
 }
 

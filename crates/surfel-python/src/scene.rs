@@ -69,7 +69,9 @@ impl PyScene {
         work: impl FnOnce(&LiveScene, &ChosenView, &dyn Progress) -> surfel::Result<T> + Send,
     ) -> PyResult<T> {
         let (scene, view) = self.open_view(py, keys, progress)?;
-        work::run(py, progress, |progress| scene.install(|scene| work(scene, &view, progress)))
+        work::run(py, progress, |progress| {
+            scene.install(progress, |scene| work(scene, &view, progress))
+        })
     }
 
     /// Returns the scene and its view under a description; both are made unless they are there.
@@ -108,7 +110,7 @@ impl PyScene {
         }
         rays.with_rows(|rows| {
             work::run(py, progress, |progress| {
-                scene.install(|scene| {
+                scene.install(progress, |scene| {
                     query(&RayQuery::new(rows, t_range, view, scene.simd()), progress)
                 })
             })

@@ -242,6 +242,27 @@ def test_spawned_processes_render():
     process.join(60)
 
 
+def test_threads_share_a_scene_with_threads_of_its_own():
+    scene = surfel.Scene(threads=2, **SMALL)
+    scene.add(surfel.Cloud(hill_points(150)))
+    work = lambda i: [scene.render(normals_k=8 + i + 4 * k) for k in range(3)]
+    threads = [threading.Thread(target=work, args=(i,), daemon=True) for i in range(3)]
+    [thread.start() for thread in threads]
+    [thread.join(120) for thread in threads]
+    assert not any(thread.is_alive() for thread in threads)
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="threads as Linux lists them")
+def test_a_scene_starts_no_more_threads_than_it_is_given(hill):
+    surfel.load(hill).render(**SMALL)
+    n_threads = lambda: len(os.listdir("/proc/self/task"))
+    before = n_threads()
+    scene = surfel.load(hill, threads=3)
+    scene.render(**SMALL)
+    scene.bounds
+    assert n_threads() - before == 3
+
+
 def test_a_scene_has_its_own_number_of_threads(hill):
     one, two = (surfel.load(hill, threads=n).render(**SMALL).color for n in (1, 2))
     assert (one == two).all()

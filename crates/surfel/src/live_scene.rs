@@ -48,8 +48,8 @@ pub struct LiveScene {
     hidden_walls: OnceLock<Vec<ClipPlane>>,
     /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
     preparation_threads: ThreadPool,
-    /// Threads for whole pictures, which take long. They run when the others leave processors idle.
-    picture_threads: ThreadPool,
+    /// Threads for whole pictures, which take long, once one is rendered. They run when the others leave processors idle.
+    picture_threads: OnceLock<ThreadPool>,
     use_case: UseCase,
 }
 
@@ -96,7 +96,12 @@ impl LiveScene {
     ) -> Result<Self> {
         let mut startup = description.clone();
         startup.apply_object_settings()?;
-        let loaded = LoadedScene::read(&startup, KEEP, progress)?;
+        let preparation_threads = start_threads(&description.run, |_| ())?;
+        let read = || LoadedScene::read(&startup, KEEP, progress);
+        let loaded = match description.run.threads {
+            Some(_) => preparation_threads.install(read),
+            None => read(),
+        }?;
         Ok(Self {
             startup,
             loaded: Arc::new(loaded),
@@ -107,8 +112,8 @@ impl LiveScene {
             preview_cache: BuildCache::default(),
             renderer: SceneRenderer::new(&description.run)?,
             hidden_walls: OnceLock::new(),
-            preparation_threads: start_threads(&description.run, |_| ())?,
-            picture_threads: start_threads(&description.run, |_| lower_priority())?,
+            preparation_threads,
+            picture_threads: OnceLock::new(),
             use_case,
         })
     }
@@ -116,6 +121,14 @@ impl LiveScene {
     /// Returns the number of threads that prepare and render.
     pub fn n_threads(&self) -> usize {
         self.preparation_threads.current_num_threads()
+    }
+
+    /// Runs `work` on the threads of preparation if the settings state their number, or else on the caller's.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        match self.startup.run.threads {
+            Some(_) => self.preparation_threads.install(work),
+            None => work(),
+        }
     }
 
     /// Frees everything that can be made again from the files' content. Views that are still held stay whole.
@@ -322,10 +335,19 @@ impl LiveScene {
     ///
     /// # Errors
     ///
-    /// Fails if the settings make no picture, and if cancelled.
+    /// Fails if the settings make no picture, if threads cannot be started, and if cancelled.
     pub fn render(&self, view: &LiveView, progress: &dyn Progress) -> Result<Image> {
         let rendered = || self.renderer.render(&view.flat, &view.settings, progress);
-        Ok(self.picture_threads.install(rendered)?.0)
+        Ok(self.picture_threads()?.install(rendered)?.0)
+    }
+
+    /// Returns the threads for whole pictures, which are started unless they are there.
+    fn picture_threads(&self) -> Result<&ThreadPool> {
+        if let Some(threads) = self.picture_threads.get() {
+            return Ok(threads);
+        }
+        let threads = start_threads(&self.startup.run, |_| lower_priority())?;
+        Ok(self.picture_threads.get_or_init(|| threads))
     }
 
     fn flat_at(

@@ -56,7 +56,7 @@ fn settings_change_while_all_threads_of_a_picture_are_busy() {
     (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
     let view = scene.view(&description, &NoProgress).unwrap();
     let halt = Halt::default();
-    let n_threads = scene.picture_threads.current_num_threads();
+    let n_threads = scene.picture_threads().unwrap().current_num_threads();
     let mut changed = description.clone();
     changed.objects_default.surface.radius_scale = Some(1.5);
     thread::scope(|scope| {
@@ -167,6 +167,6 @@ fn threads_of_pictures_have_the_lowest_priority() {
         let after_name = file.rsplit_once(") ").unwrap().1.to_owned();
         after_name.split(' ').nth(16).unwrap().parse::<i32>().unwrap()
     };
-    assert_eq!(scene.picture_threads.install(niceness), 19);
+    assert_eq!(scene.picture_threads().unwrap().install(niceness), 19);
     assert_eq!(scene.preparation_threads.install(niceness), niceness());
 }
