@@ -68,6 +68,10 @@ fn run_reporting<T: Send>(
             match received {
                 Ok(Ok(result)) => {
                     let result = result.map_err(|error| to_exception(py, &error));
+                    // Work that ends between two reports is reported, too.
+                    if raised.is_none() && result.is_ok() {
+                        listener.report(callback)?;
+                    }
                     return raised.map_or(result, Err);
                 }
                 Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => return Err(panicked()),

@@ -2,13 +2,13 @@
 //
 //     node jupyter_page.mjs LINK SCREENSHOT
 //
-// Prints the origins that frame the viewer and the number of different colours in its picture. Each step ends within a
-// minute; one that does not is named, with what the page showed and which messages it had exchanged with the kernel.
+// Prints the origins that frame the viewer and the number of different colours in its picture. Each step ends within
+// four minutes; one that does not is named, with what the page showed and which messages it had exchanged with the kernel.
 
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 
-const STEP_TIMEOUT_MS = 60_000;
+const STEP_TIMEOUT_MS = 240_000;
 /** Chromium sends no animation frames to a frame out of view, so conditions are looked at by the clock. */
 const BY_CLOCK = { polling: 200 };
 const N_LISTED_MESSAGES = 60;

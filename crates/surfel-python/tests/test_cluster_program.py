@@ -58,7 +58,7 @@ def test_what_workers_say_is_shown(cluster, hill, tmp_path):
 
 
 def test_schedulers_that_do_not_answer_are_named(hill, tmp_path):
-    ended = animate(hill, "-o", tmp_path / "turn.gif", *TURN, "--cluster", "tcp://127.0.0.1:1")
+    ended = animate(hill, "-o", tmp_path / "turn.gif", *TURN, "--cluster", "tcp://127.0.0.1:1", DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT="2s")
     assert ended.returncode == 1 and "127.0.0.1:1" in ended.stderr, ended.stderr
     assert not list(tmp_path.iterdir())
 

@@ -111,12 +111,14 @@ def test_a_scheduler_that_vanishes_leaves_the_finished_frames(hill, tmp_path):
     processes = [start("scheduler", "--port", "0", "--no-dashboard")]
     try:
         while not found.exists():
+            assert processes[0].poll() is None
             time.sleep(0.05)
         processes.append(start("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard"))
         with distributed.Client(scheduler_file=str(found)) as client:
-            client.wait_for_workers(1)
+            client.wait_for_workers(1, timeout=300)
             (tmp_path / "film").mkdir()
-            end = threading.Thread(target=lambda: kill_after_a_file(processes[0], tmp_path / "film"))
+            arguments = (processes[0], tmp_path / "film")
+            end = threading.Thread(target=kill_after_a_file, args=arguments, daemon=True)
             end.start()
             with pytest.raises(ClusterLost, match="start it and do the same again"):
                 save_frames(Recipe(hill, turntable=40, **SMALL), range(1000), tmp_path / "film" / "frame_####.png")

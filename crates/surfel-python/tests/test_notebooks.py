@@ -42,7 +42,8 @@ def test_notebooks_run(name, hill, tmp_path):
     assert {line.split(" = ")[0] for line in first.source.splitlines()} == set(parameters)
     first.source = "\n".join(f"{key} = {value!r}" for key, value in parameters.items())
     resources = {"metadata": {"path": str(tmp_path)}}
-    nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
+    waits = {"timeout": 300, "startup_timeout": 300, "iopub_timeout": 300}
+    nbclient.NotebookClient(notebook, kernel_name="python3", resources=resources, **waits).execute()
     outputs = [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", [])]
     pictures = [data for data in outputs if "image/png" in data or "image/gif" in data]
     assert len(pictures) == N_PICTURES.get(name, 1)

@@ -12,16 +12,13 @@ from distributed import Client
 from surfel.dask import ClusterLost, Recipe, render_frames
 from surfel.dask._frames import completed
 
-#: Seconds in which a scheduler must answer.
-TIMEOUT_SECS = 10
-
 
 def main():
     """Renders a job; returns the exit code."""
     job = json.load(sys.stdin)
     recipe = Recipe(*job["files"], _scene=job["scene"])
     try:
-        with Client(job["address"], timeout=TIMEOUT_SECS) as client:
+        with Client(job["address"]) as client:
             write_frames(client, recipe, job)
     except KeyboardInterrupt:
         return 130
