@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, data, openPage, QUICK, reopen, serve, settled, shell, state, unfoldPanel } from './harness.mjs';
+import { closePage, data, openPage, QUICK, recorded, reopen, serve, settled, shell, state, unfoldPanel } from './harness.mjs';
 
 let page;
 before(async () => {
@@ -46,6 +46,8 @@ test('views are added, moved in time, replaced, deleted, and these changes undon
   await page.locator('[data-path-time="2"]').press('Enter');
   await settled(page);
   assert.deepEqual((await path()).times, [0, 1.5, 3]);
+  // What follows before this state is recorded would be undone with it.
+  await recorded(page, ({ camera_path }) => camera_path?.times[1] === 1.5);
   const { position } = await path();
   await page.locator('[aria-label="Set view 1 to the current view"]').click();
   await settled(page);
@@ -53,7 +55,6 @@ test('views are added, moved in time, replaced, deleted, and these changes undon
   await page.locator('[aria-label="Delete view 2"]').click();
   await settled(page);
   assert.deepEqual(await times(), [0, 3]);
-  await page.waitForFunction(() => !document.querySelector('[data-action="undo"]').disabled);
   await page.locator('[data-action="undo"]').click();
   await settled(page);
   assert.deepEqual(await times(), [0, 1.5, 3]);

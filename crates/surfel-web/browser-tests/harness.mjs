@@ -5,14 +5,14 @@ import { execFileSync, spawn } from 'node:child_process';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { after } from 'node:test';
-import { encodeHash } from '../page/link.js';
+import { decodeHash, encodeHash } from '../page/link.js';
 import { makeData } from './data.mjs';
 
 const TARGET = process.env.CARGO_TARGET_DIR ?? join(import.meta.dirname, '../../../target');
 /** The program under test. */
 export const SURFEL = process.env.SURFEL ?? join(TARGET, 'debug/surfel');
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
-const TIMEOUT_MS = 60_000;
+export const TIMEOUT_MS = 60_000;
 /** A host name of this machine that is no secure context to the browser, like the names of other machines. */
 export const PLAIN_HOST = 'surfel.test';
 const FLAGS = [`--host-resolver-rules=MAP ${PLAIN_HOST} 127.0.0.1`, '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
@@ -197,6 +197,15 @@ export async function copyBy(button) {
   });
   await button.click();
   await button.and(button.page().locator('[data-copied]')).waitFor();
+}
+
+/** Waits until a state is recorded whose patch fulfils the condition: the address has it. */
+export async function recorded(page, condition) {
+  const start = performance.now();
+  while (!condition(decodeHash(new URL(page.url()).hash)?.patch ?? {})) {
+    assert.ok(performance.now() - start < TIMEOUT_MS, `${page.url()} never fulfils ${condition}`);
+    await page.waitForTimeout(20);
+  }
 }
 
 /** Shows the initial scene with `patch`, as a link typed into the address bar does. */

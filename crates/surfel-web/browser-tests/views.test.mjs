@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, data, finishedPixels, openPage, pixels, QUICK, reopen, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, data, finishedPixels, openPage, pixels, QUICK, recorded, reopen, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 let server;
 let page;
@@ -40,12 +40,11 @@ test('views are saved, renamed, visited, deleted, and these changes undone', asy
   await page.locator('[aria-label="Go to from the south"]').click();
   assert.equal(await finishedPixels(page), first);
   assert.deepEqual((await state(page, 'camera')).position, opening.position);
-  // A state is recorded after 400 ms without a change; what follows sooner is undone with it.
-  await page.waitForTimeout(1000);
+  // What follows before this state is recorded would be undone with it.
+  await recorded(page, (patch) => patch.views?.[0].name === 'from the south');
   await page.locator('[aria-label="Delete view 2"]').click();
   await settled(page);
   assert.deepEqual((await views()).map(({ name }) => name), ['from the south']);
-  await page.waitForFunction(() => !document.querySelector('[data-action="undo"]').disabled);
   await page.locator('[data-action="undo"]').click();
   await settled(page);
   assert.deepEqual(await names(), ['from the south', 'view 2']);

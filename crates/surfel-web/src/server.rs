@@ -127,6 +127,8 @@ impl Server {
                 wait_until_stopped(&state).await;
             }
             accepting.abort();
+            // The port is closed once the task has ended: no connection may be accepted after that.
+            let _ = accepting.await;
             loaded
         });
         state.is_stopped.store(true, Ordering::Relaxed);

@@ -364,7 +364,11 @@ impl Session {
                     let bytes = frame::saved_message(id, (width as u16, height as u16), &png);
                     Outgoing::Binary(bytes, is_cancelled)
                 }
-                Err(error) => Outgoing::Text(rejection(RequestRef::Id(id), &error).to_string()),
+                Err(error) => {
+                    // Another save may begin as soon as the page has the error.
+                    drop(is_cancelled);
+                    Outgoing::Text(rejection(RequestRef::Id(id), &error).to_string())
+                }
             };
             let _ = out.send(message).await;
         });

@@ -1,6 +1,6 @@
 //! Misbehaving clients: whatever they send, the server keeps serving others in bounded memory.
 
-use crate::http_client::{begin, read_response};
+use crate::http_client::{begin, get, read_response};
 use crate::test_page::{TestPage, camera};
 use crate::test_server::{TIMEOUT, TestServer};
 use serde_json::{Value, json};
@@ -330,7 +330,7 @@ async fn connections_beyond_the_limit_do_not_block_pages() {
 
 #[tokio::test]
 async fn idle_connections_time_out() {
-    let timeouts = Timeouts { request: Duration::from_millis(500), ..Timeouts::default() };
+    let timeouts = Timeouts { request: Duration::from_secs(3), ..Timeouts::default() };
     let server = TestServer::start_with_limits(Limits { timeouts, ..Limits::default() });
     let mut upgraded = TestPage::connect(&server).await.unwrap();
     let requests = [
@@ -364,6 +364,12 @@ async fn pages_that_do_not_answer_pings_are_closed() {
     let mut silent = TestPage::open(&server, json!({})).await;
     reading.drain(timeouts.idle + Duration::from_secs(1)).await;
     reading.sync().await;
+    // A page that reads again answers its pings: it is left alone until the server has closed it.
+    let start = Instant::now();
+    while get(&server, "/stats").await.json()["clients"] != 1 {
+        assert!(start.elapsed() < TIMEOUT, "the silent page is still connected");
+        reading.drain(Duration::from_millis(100)).await;
+    }
     silent.wait_until_closed().await;
 }
 

@@ -11,7 +11,11 @@ use tokio::io::AsyncWriteExt;
 
 /// A server of small limits.
 fn start() -> TestServer {
-    let timeouts = Timeouts { request: Duration::from_millis(1500), ..Timeouts::default() };
+    start_with_timeouts(Timeouts::default())
+}
+
+/// A server of small limits that waits for these durations.
+fn start_with_timeouts(timeouts: Timeouts) -> TestServer {
     TestServer::start_with_limits(Limits {
         max_added_file_bytes: 20_000_000,
         max_added_bytes: 30_000_000,
@@ -175,7 +179,8 @@ async fn foreign_pages_and_clients_without_the_token_send_nothing() {
 
 #[tokio::test]
 async fn slow_and_silent_clients_are_given_up() {
-    let server = start();
+    let request = Duration::from_secs(3);
+    let server = start_with_timeouts(Timeouts { request, ..Timeouts::default() });
     let mut page = TestPage::open(&server, json!({})).await;
     // One never sends.
     announced(&mut page, 1, "a", 5).await;

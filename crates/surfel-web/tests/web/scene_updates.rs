@@ -110,19 +110,28 @@ async fn memory_is_freed_once_the_last_page_has_gone() {
     let timeouts = Timeouts { release: Duration::from_millis(300), ..Timeouts::default() };
     let server = TestServer::start_with_limits(Limits { timeouts, ..Limits::default() });
     let n_released = || server.provider.n_released.load(Ordering::Relaxed);
-    let first = TestPage::open(&server, json!({})).await;
+    let mut first = TestPage::open(&server, json!({})).await;
     let mut second = TestPage::open(&server, json!({})).await;
+    first.message("welcome").await;
+    second.message("welcome").await;
     drop(first);
-    second.drain(Duration::from_millis(600)).await;
+    second.drain(2 * timeouts.release).await;
     assert_eq!(n_released(), 0, "a page is left");
-    // A page that is loaded again keeps what it had.
     drop(second);
-    let mut third = TestPage::open(&server, json!({})).await;
-    third.finished_picture().await;
-    third.drain(Duration::from_millis(600)).await;
-    assert_eq!(n_released(), 0, "a page came back");
-    drop(third);
     wait_until(|| n_released() == 1).await;
+}
+
+#[tokio::test]
+async fn a_page_that_is_loaded_again_keeps_its_memory() {
+    let timeouts = Timeouts { release: Duration::from_secs(4), ..Timeouts::default() };
+    let server = TestServer::start_with_limits(Limits { timeouts, ..Limits::default() });
+    let mut first = TestPage::open(&server, json!({})).await;
+    first.message("welcome").await;
+    drop(first);
+    let mut again = TestPage::open(&server, json!({})).await;
+    again.finished_picture().await;
+    again.drain(timeouts.release + Duration::from_secs(1)).await;
+    assert_eq!(server.provider.n_released.load(Ordering::Relaxed), 0);
 }
 
 #[tokio::test]
