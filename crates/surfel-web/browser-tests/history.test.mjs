@@ -92,6 +92,21 @@ test('a reload keeps camera, settings and measurements', async () => {
   assert.equal(decodeHash(await address()).measurements.length, 1);
 });
 
+test('a scene file is undone and redone', async () => {
+  const first = await color();
+  await change(() => colorField().selectOption('elevation'));
+  const file = { name: 'a.toml', mimeType: 'text/plain', buffer: Buffer.from('color = "normal"') };
+  await change(() => page.locator('#scene-file').setInputFiles(file));
+  assert.equal(await color(), 'normal');
+  await change(() => undo().click());
+  assert.equal(await color(), 'elevation');
+  await change(() => undo().click());
+  assert.equal(await color(), first);
+  await change(() => redo().click());
+  await change(() => redo().click());
+  assert.equal(await color(), 'normal');
+});
+
 test('a refused value leaves no state behind', async () => {
   const filter = page.locator('#panel [data-key=filter]');
   await filter.fill('no_such_column == 1');

@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { completed } from '../page/camera.js';
 import { Navigation } from '../page/navigation.js';
+import { signal } from '../page/signal.js';
 
 const current = { position: [1, 2, 3], focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 35 };
 const { view_angle, ...place } = current;
@@ -12,7 +13,8 @@ const { view_angle, ...place } = current;
 function movedTo(camera) {
   globalThis.matchMedia = () => ({ matches: true });
   const given = { set: [], found: [] };
-  const viewer = { camera: current, setCamera: (set) => given.set.push(set), findCamera: (keys) => given.found.push(keys) };
+  const [setCamera, findCamera] = [(set) => given.set.push(set), (keys) => given.found.push(keys)];
+  const viewer = { camera: current, viewReplaced: signal(), setCamera, findCamera };
   new Navigation(viewer).transitionTo(camera);
   return given;
 }

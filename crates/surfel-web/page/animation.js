@@ -58,6 +58,7 @@ export function animationRows(viewer, section) {
     else if (viewer.camera) viewer.setCamera(viewer.camera, false);
   });
 
+  viewer.viewReplaced.listen(() => { if (isPlaying) setPlaying(false); });
   play.replaceChildren(icon('play'), 'Play');
   const followRow = toggleRow(follow, 'Follow', 'The animation moves the camera until you move it yourself\ncamera.lock');
   viewer.infoChanged.listen(() => {

@@ -23,6 +23,10 @@ export class Navigation {
 
   constructor(viewer) {
     this.viewer = viewer;
+    viewer.viewReplaced.listen(() => {
+      this.stop();
+      if (this.isActive) this.endInteraction();
+    });
   }
 
   get camera() {

@@ -30,6 +30,8 @@ export class Viewer {
   sceneChanged = signal();
   /** Emits when settings or the camera are changed here, not by the server. */
   changedByUser = signal();
+  /** Emits before the server replaces scene and camera, by those of a scene file or of other data. */
+  viewReplaced = signal();
   cameraChanged = signal();
   frameShown = signal();
   toolChanged = signal();
@@ -57,7 +59,8 @@ export class Viewer {
   #requests = new Map();
   #lastRequestId = 0;
   #helloPatch;
-  #takesNextCamera = false;
+  /** Id of the request for a scene file that the server has not answered. */
+  #loadId = null;
 
   constructor(linkPatch) {
     this.#helloPatch = linkPatch;
@@ -101,7 +104,8 @@ export class Viewer {
 
   /** Whether the picture on the screen shows all settings that were changed here, rejected ones aside. */
   get isSynced() {
-    return !this.#queuedPatch && this.#pendingPatches.length === 0 && this.lastFrame?.scene === this.#sceneNumber;
+    const isPending = this.#queuedPatch || 0 < this.#pendingPatches.length || this.#loadId !== null;
+    return !isPending && this.lastFrame?.scene === this.#sceneNumber;
   }
 
   /** The scene with the user's camera. */
@@ -173,10 +177,13 @@ export class Viewer {
     const text = maxBytes < file.size ? null : await file.text();
     const message = { type: 'loadScene', id: ++this.#lastRequestId, name: file.name, text };
     if (text === null || maxBytes < byteLength(message)) this.rejected({ text: `${file.name} is too large for a scene file` });
-    else if (!this.#connection.send(message)) this.rejected({ text: `${file.name}: there is no connection` });
+    else if (!this.isConnected) this.rejected({ text: `${file.name}: there is no connection` });
     else {
-      this.#takesNextCamera = true;
-      this.#pendingPatches = [];
+      // What was changed before the file must not be sent after it.
+      this.viewReplaced();
+      this.#flush();
+      this.#connection.send(message);
+      this.#loadId = message.id;
     }
   }
 
@@ -271,19 +278,21 @@ export class Viewer {
 
   #receiveWelcome({ scene, info }) {
     const isOtherData = this.info?.name !== info.name;
+    if (isOtherData && this.info) this.viewReplaced();
     const ofFiles = info.bounds;
     Object.defineProperty(info, 'bounds', { get: () => boxAround([ofFiles, ...this.addedObjects.map(({ bounds }) => bounds)]) });
     this.info = info;
     this.initialScene = scene;
     this.#confirmedScene = mergePatch(scene, this.#helloPatch);
     [this.#sceneNumber, this.lastFrame] = [null, null];
-    this.#pendingPatches = [];
+    [this.#pendingPatches, this.#loadId] = [[], null];
+    // Messages of an earlier connection have no effect on this one.
+    this.#lastCameraSeq = 0;
     this.#applyPendingPatches();
     // The first scene message carries the position of an animated camera.
     if (isOtherData) this.camera = info.camera_moves && !this.scene.camera.lock ? null : this.scene.camera;
     this.#cameraBySeq.set(this.#seq, this.camera);
-    this.#takesNextCamera = isOtherData;
-    if (isOtherData) [this.#queuedPatch, this.#queuedCamera] = [null, null];
+    if (isOtherData) [this.#queuedPatch, this.#queuedCamera, this.#isMoving] = [null, null, false];
     this.isConnected = true;
     this.connectionChanged({ isConnected: true });
     // Sends the changes made while there was no connection.
@@ -293,20 +302,24 @@ export class Viewer {
     this.cameraChanged();
   }
 
-  #receiveScene({ number, scene, camera, legend, seq }) {
+  #receiveScene({ number, id, seq, scene, camera, legend }) {
     this.legend = legend;
     this.#confirmedScene = scene;
     this.#sceneNumber = number;
     this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
     this.#applyPendingPatches();
     const isIdle = !this.#queuedCamera && !this.#isMoving && this.#lastCameraSeq <= seq;
-    if ((isIdle || this.#takesNextCamera) && !areEqual(camera, this.camera)) {
+    if (isIdle && !areEqual(camera, this.camera)) {
       this.camera = camera;
-      // Pictures after `loadScene` show this camera for all earlier messages, too.
+      // Pictures of this scene show this camera for all earlier messages, too.
       for (const earlier of [seq, ...this.#cameraBySeq.keys()]) this.#cameraBySeq.set(earlier, camera);
       this.cameraChanged();
     }
-    this.#takesNextCamera = false;
+    if (id !== undefined) {
+      // The user has chosen a scene file, and can undo it.
+      if (id === this.#loadId) this.#loadId = null;
+      this.changedByUser();
+    }
     this.sceneChanged();
   }
 
@@ -317,7 +330,7 @@ export class Viewer {
   }
 
   #receiveError({ id, seq, key, text }) {
-    if (this.camera) this.#takesNextCamera = false;
+    if (id === this.#loadId) this.#loadId = null;
     if (seq !== undefined) {
       this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
       this.#applyPendingPatches();

@@ -16,6 +16,8 @@ pub struct SettingsChange {
     pub seq: u32,
     /// True if the user is still dragging.
     pub is_moving: bool,
+    /// Id of the `LoadScene` that is part of the change, until a scene has answered it.
+    pub load_id: Option<u32>,
 }
 
 impl SettingsChange {
@@ -131,9 +133,13 @@ mod tests {
         assert_eq!(pending.lock().take(), Some(expected));
         assert!(pending.is_empty());
         pending.requeue(change(json!({ "a": 1 }), 7));
-        let from_startup = SettingsChange { from_startup: true, ..change(json!({ "c": 3 }), 9) };
+        let from_startup =
+            SettingsChange { from_startup: true, load_id: Some(1), ..change(json!({ "c": 3 }), 9) };
         pending.add(from_startup.clone()).unwrap();
-        assert_eq!(pending.lock().take(), Some(from_startup));
+        pending.add(change(json!({ "d": 4 }), 10)).unwrap();
+        let patch = settings(json!({ "c": 3, "d": 4 }));
+        let expected = SettingsChange { patch, seq: 10, ..from_startup };
+        assert_eq!(pending.lock().take(), Some(expected));
     }
 
     #[test]

@@ -33,8 +33,8 @@ pub async fn run(
         SceneUpdater { state, client, pending, out, provider, settings, shows_preview };
     // Nothing would be prepared any more: the change would be cancelled and taken again without end.
     while !updater.out.is_closed() && !updater.state.is_stopped() {
-        let change = updater.pending.take().await;
-        updater.show_preview(&change).await;
+        let mut change = updater.pending.take().await;
+        updater.show_preview(&mut change).await;
         updater.apply(change).await;
     }
 }
@@ -82,13 +82,14 @@ struct SceneUpdater {
 
 impl SceneUpdater {
     /// Shows a subset of the points before the whole scene is prepared, if that takes long.
-    async fn show_preview(&mut self, change: &SettingsChange) {
+    async fn show_preview(&mut self, change: &mut SettingsChange) {
         let (provider, settings) = (self.provider.clone(), self.settings_with(change));
         let reporter = self.reporter();
         let task = move || provider.preview(&settings, &reporter);
         if let Ok(Some(Ok(scene))) = self.state.run_blocking(task).await {
             self.show(scene, change).await;
             self.shows_preview = true;
+            change.load_id = None;
         }
     }
 
@@ -121,7 +122,11 @@ impl SceneUpdater {
                 if self.shows_preview {
                     self.take_back_preview(&change).await;
                 }
-                send_json(&self.out, &rejection(RequestRef::Seq(change.seq), &error)).await;
+                let mut message = rejection(RequestRef::Seq(change.seq), &error);
+                if let Some(id) = change.load_id {
+                    message["id"] = json!(id);
+                }
+                send_json(&self.out, &message).await;
                 self.client.set_moving(change.is_moving);
                 // A page whose first settings are invalid shows the initial scene.
                 if self.client.view().scene.is_none() && !change.patch.is_empty() {
@@ -151,7 +156,7 @@ impl SceneUpdater {
         let shown_camera = scene.animated_camera.as_ref().unwrap_or(&camera_settings);
         // Pictures of the previous scene may still be on their way; the number tells them apart.
         let scene_number = self.client.view().scene_number.wrapping_add(1);
-        let message = json!({
+        let mut message = json!({
             "type": "scene",
             "number": scene_number,
             "seq": change.seq,
@@ -159,15 +164,20 @@ impl SceneUpdater {
             "camera": shown_camera,
             "legend": scene.legend,
         });
+        if let Some(id) = change.load_id {
+            message["id"] = json!(id);
+        }
         // The page must know the settings before it gets the first picture of them.
         send_json(&self.out, &message).await;
-        let sets_camera = scene.animated_camera.is_some() || change.patch.contains_key("camera");
+        let sets_camera = scene.animated_camera.is_some()
+            || change.from_startup
+            || change.patch.contains_key("camera");
         let camera = camera::parse(shown_camera).ok();
         let scene = Arc::new(scene);
         self.client.update_view(|view| {
             // The user may have moved the camera while the scene was prepared.
             let is_newest = sets_camera && view.seq <= change.seq;
-            if view.camera.is_none() || change.from_startup || is_newest {
+            if view.camera.is_none() || is_newest {
                 (view.camera, view.camera_settings) = (camera, camera_settings);
             }
             (view.scene, view.scene_number) = (Some(scene), scene_number);

@@ -69,6 +69,7 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 saves,
                 download,
                 files,
+                last_seq: 0,
             };
             session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
@@ -101,6 +102,8 @@ struct Session {
     download: Arc<Mutex<Option<DownloadGuard>>>,
     /// The files that the page has added.
     files: Arc<PageFiles>,
+    /// Sequence number of the last camera or settings change.
+    last_seq: u32,
 }
 
 impl Session {
@@ -147,11 +150,14 @@ impl Session {
             Incoming::Hello { .. } => self.reject_text("hello was sent already").await,
             Incoming::Size { width, height } => self.resize(width, height).await,
             Incoming::Camera { seq, camera, moving } => {
+                self.last_seq = seq;
                 self.set_camera(seq, camera, moving).await;
             }
             Incoming::Set { seq, scene, moving } => {
-                let (patch, from_startup, is_moving) = (scene, false, moving);
-                self.change(SettingsChange { patch, from_startup, seq, is_moving }).await;
+                self.last_seq = seq;
+                let (patch, is_moving) = (scene, moving);
+                self.change(SettingsChange { patch, seq, is_moving, ..SettingsChange::default() })
+                    .await;
             }
             Incoming::Ack { frame } => {
                 self.client.acknowledge(frame);
@@ -213,9 +219,9 @@ impl Session {
     }
 
     async fn change(&self, change: SettingsChange) {
-        let seq = change.seq;
+        let request = change.load_id.map_or(RequestRef::Seq(change.seq), RequestRef::Id);
         if let Err(error) = self.pending.add(change) {
-            self.reject(RequestRef::Seq(seq), &error).await;
+            self.reject(request, &error).await;
         }
     }
 
@@ -469,9 +475,9 @@ impl Session {
         let read = self.state.run_blocking(move || provider.read_scene_file(&name, &text)).await;
         match read.flatten() {
             Ok(patch) => {
-                let from_startup = true;
-                self.change(SettingsChange { patch, from_startup, ..SettingsChange::default() })
-                    .await;
+                let (from_startup, is_moving, load_id) = (true, false, Some(id));
+                let seq = self.last_seq;
+                self.change(SettingsChange { patch, from_startup, seq, is_moving, load_id }).await;
             }
             Err(error) => self.reject(RequestRef::Id(id), &error).await,
         }

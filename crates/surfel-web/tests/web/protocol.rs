@@ -1,7 +1,7 @@
 //! The messages between page and server.
 
 use crate::http_client::get;
-use crate::test_page::{Received, SAVED, TestPage};
+use crate::test_page::{Picture, Received, SAVED, TestPage};
 use crate::test_server::{TestServer, wait_until};
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
@@ -228,9 +228,39 @@ async fn settings_are_exported_and_loaded() {
     let load = |id: u32, text: &str| json!({ "type": "loadScene", "id": id, "name": "a.json", "text": text });
     page.send_json(load(2, "{")).await;
     assert_eq!(page.message("error").await["id"], 2);
+    page.set_camera(5, 1.0, false).await;
     page.send_json(load(3, r#"{"slow":0}"#)).await;
-    let scene = page.message("scene").await["scene"].clone();
-    assert_eq!((&scene["slow"], &scene["tint"]), (&json!(0), &json!(7)));
+    let answer = page.message("scene").await;
+    assert_eq!((&answer["id"], &answer["seq"]), (&json!(3), &json!(5)));
+    assert_eq!((&answer["scene"]["slow"], &answer["scene"]["tint"]), (&json!(0), &json!(7)));
+    page.send_json(load(4, r#"{"invalid":0}"#)).await;
+    let error = page.message("error").await;
+    assert_eq!((&error["id"], &error["seq"]), (&json!(4), &json!(5)));
+    // Settings that the page changes itself answer no request.
+    page.change_settings(6, json!({ "tint": 2 })).await;
+    assert_eq!(page.message("scene").await["id"], Value::Null);
+}
+
+#[tokio::test]
+async fn a_scene_file_brings_its_camera_unless_the_user_moves_it_later() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    let first = page.finished_picture().await;
+    page.set_camera(1, 1.0, false).await;
+    let load = |id: u32, text: &str| json!({ "type": "loadScene", "id": id, "name": "a.json", "text": text });
+    page.send_json(load(1, r#"{"tint":0}"#)).await;
+    page.message("scene").await;
+    let loaded = page.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
+    assert_eq!(loaded.files, first.files);
+    page.send_json(load(2, r#"{"tint":0,"gated":true}"#)).await;
+    page.set_camera(2, 1.0, false).await;
+    for picture in page.sync().await {
+        page.acknowledge(&picture).await;
+    }
+    server.provider.gate.open();
+    let number = page.message("scene").await["number"].clone();
+    let condition = |picture: &Picture| picture.is_finished && json!(picture.scene_number) == number;
+    assert_ne!(page.wait_for_picture(condition).await.files, first.files);
 }
 
 #[tokio::test]
