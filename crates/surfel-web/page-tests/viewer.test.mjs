@@ -40,3 +40,37 @@ test('a camera that the user sets after a scene file stays', async () => {
   server.send({ type: 'scene', number: 2, seq: 0, id, scene: SCENE, camera: camera(9), legend: null });
   assert.deepEqual(viewer.camera.position, [4, 0, 0]);
 });
+
+test('what is exported has all changes made before', async () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  viewer.changeSettings({ color: 'class' });
+  viewer.setCamera(camera(4), false);
+  const answer = viewer.request({ type: 'export', width: 3, height: 2 });
+  const abort = new AbortController();
+  const cancelled = viewer.request({ type: 'save', width: 3, height: 2 }, { abort: abort.signal });
+  viewer.request({ type: 'pick', x: 1, y: 1 });
+  assert.equal(server.sent('pick').length, 1);
+  nextFrame();
+  assert.deepEqual([server.sent('set').length, server.sent('camera').length, server.sent('export').length], [1, 1, 0]);
+  abort.abort();
+  await assert.rejects(cancelled, /cancelled/);
+  server.send({ type: 'scene', number: 2, seq: 1, scene: { ...SCENE, color: 'class' }, camera: CAMERA, legend: null });
+  const [{ id }] = server.sent('export');
+  server.send({ type: 'exported', id, command: 'surfel' });
+  assert.equal((await answer).command, 'surfel');
+  assert.equal(server.sent('save').length, 0);
+});
+
+test('a rejected change delays an export no longer, and a lost connection ends it', async () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  viewer.changeSettings({ color: 'class' });
+  const lost = viewer.request({ type: 'export', width: 3, height: 2 });
+  viewer.request({ type: 'points', format: 'laz' }).catch(() => {});
+  nextFrame();
+  server.send({ type: 'error', seq: 1, text: 'there are no classes' });
+  assert.equal(server.sent('export').length, 1);
+  server.close();
+  await assert.rejects(lost, /lost/);
+  server.welcome();
+  assert.deepEqual([server.sent('export').length, server.sent('points').length], [0, 0]);
+});

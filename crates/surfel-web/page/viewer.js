@@ -8,6 +8,8 @@ import { rejectionText } from './rejections.js';
 import { signal } from './signal.js';
 
 const MAX_LATENCIES = 600;
+/** Requests for what the view shows: they are sent once all changes before them have taken effect. */
+const VIEW_REQUESTS = ['export', 'save', 'film', 'points'];
 
 export class Viewer {
   info = null;
@@ -57,6 +59,8 @@ export class Viewer {
   #cameraBySeq = new Map();
   #sendTimeBySeq = new Map();
   #requests = new Map();
+  /** Requests for what the view shows that are not sent yet. */
+  #waitingRequests = [];
   #lastRequestId = 0;
   #helloPatch;
   /** Id of the request for a scene file that the server has not answered. */
@@ -104,8 +108,12 @@ export class Viewer {
 
   /** Whether the picture on the screen shows all settings that were changed here, rejected ones aside. */
   get isSynced() {
-    const isPending = this.#queuedPatch || 0 < this.#pendingPatches.length || this.#loadId !== null;
-    return !isPending && this.lastFrame?.scene === this.#sceneNumber;
+    return this.#isConfirmed && this.lastFrame?.scene === this.#sceneNumber;
+  }
+
+  /** Whether all changes of the settings have taken effect or were rejected. */
+  get #isConfirmed() {
+    return !this.#queuedPatch && this.#pendingPatches.length === 0 && this.#loadId === null;
   }
 
   /** The scene with the user's camera. */
@@ -192,7 +200,8 @@ export class Viewer {
     const id = ++this.#lastRequestId;
     return new Promise((resolve, reject) => {
       this.#requests.set(id, { resolve, reject, progress });
-      if (!this.#connection.send({ ...message, id })) this.#rejectRequest(id, 'there is no connection');
+      this.#waitingRequests.push({ ...message, id });
+      this.#sendRequests();
       abort?.addEventListener('abort', () => {
         this.#connection.send({ type: 'cancel', id });
         this.#rejectRequest(id, 'cancelled');
@@ -224,6 +233,15 @@ export class Viewer {
     this.frameShown();
   }
 
+  #sendRequests() {
+    const isReady = !this.isConnected || (this.#isConfirmed && !this.#queuedCamera);
+    // Those that were cancelled meanwhile are answered already.
+    for (const message of this.#waitingRequests.splice(0).filter(({ id }) => this.#requests.has(id))) {
+      if (!isReady && VIEW_REQUESTS.includes(message.type)) this.#waitingRequests.push(message);
+      else if (!this.#connection.send(message)) this.#rejectRequest(message.id, 'there is no connection');
+    }
+  }
+
   #sendHello() {
     this.#connection.send({ type: 'hello', ...this.size, scene: this.#helloPatch });
   }
@@ -246,6 +264,7 @@ export class Viewer {
       this.#queuedCamera = null;
       this.#lastCameraSeq = this.#seq;
     }
+    this.#sendRequests();
   }
 
   #send(message) {
@@ -274,6 +293,7 @@ export class Viewer {
       error: () => this.#receiveError(message),
     };
     handlers[message.type]?.();
+    this.#sendRequests();
   }
 
   #receiveWelcome({ scene, info }) {

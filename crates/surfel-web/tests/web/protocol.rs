@@ -259,7 +259,8 @@ async fn a_scene_file_brings_its_camera_unless_the_user_moves_it_later() {
     }
     server.provider.gate.open();
     let number = page.message("scene").await["number"].clone();
-    let condition = |picture: &Picture| picture.is_finished && json!(picture.scene_number) == number;
+    let condition =
+        |picture: &Picture| picture.is_finished && json!(picture.scene_number) == number;
     assert_ne!(page.wait_for_picture(condition).await.files, first.files);
 }
 
