@@ -27,6 +27,11 @@ test('a page reconnects and keeps its view', async () => {
   const [screen, camera] = [await finishedPixels(page), await state(page, 'camera')];
   await server.stop();
   await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  await page.locator('#toolbar [data-tool=pick]').click();
+  const { x, y } = await pixelAt(page, 0.5, 0.6);
+  await page.mouse.click(x, y);
+  await page.locator('.toast', { hasText: 'there is no connection' }).waitFor();
+  await page.locator('#toolbar [data-tool=pick]').click();
   // Changes made while there is no connection are kept, and so are those before.
   await page.locator('#viewport').focus();
   await page.keyboard.press('5');

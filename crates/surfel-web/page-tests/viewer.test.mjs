@@ -74,3 +74,13 @@ test('a rejected change delays an export no longer, and a lost connection ends i
   server.welcome();
   assert.deepEqual([server.sent('export').length, server.sent('points').length], [0, 0]);
 });
+
+test('a pick tells no surface from no answer', async () => {
+  const { viewer, server } = connectedViewer();
+  const [sky, refused] = [viewer.pick({ x: 1, y: 1 }), viewer.pick({ x: 2, y: 2 })];
+  const [first, second] = server.sent('pick');
+  server.send({ type: 'error', id: second.id, text: 'too many questions' });
+  server.send({ type: 'picked', id: first.id, point: null });
+  assert.equal(await sky, null);
+  await assert.rejects(refused, /too many questions/);
+});

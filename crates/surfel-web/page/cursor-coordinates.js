@@ -55,7 +55,7 @@ export class CursorCoordinates {
     if (viewer.isMoving || !viewer.isConnected) return;
     const start = performance.now();
     this.#isWaiting = true;
-    const point = await viewer.pick(pixel);
+    const point = await viewer.pick(pixel).catch(() => null);
     this.#isWaiting = false;
     this.#pause_ms = Math.max(MIN_PAUSE_MS, PAUSE_PER_ANSWER * (performance.now() - start));
     if (this.#pixel && !viewer.isMoving) this.text.textContent = point ? coordinatesText(point, viewer.info.unit) : '';

@@ -45,7 +45,7 @@ const crosshair = new Crosshair(viewer, overlay);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
-/** The promise of the last pick's point. */
+/** The promise of the last pick, as `pickAfter` returns it. */
 let lastPick = null;
 
 const helpDialog = document.getElementById('help-dialog');
@@ -91,8 +91,9 @@ setUpPointer(viewport, viewer, navigation, {
       await finishFigure();
       return;
     }
-    const point = await viewer.pick(pixel);
-    if (point) navigation.centerOn(point.surface);
+    const { point, error } = await pickAfter(null, pixel);
+    if (error) showToast(error.message);
+    else if (point) navigation.centerOn(point.surface);
   },
 });
 
@@ -144,9 +145,10 @@ async function useTool(pixel, isPick) {
   const isMeasuring = MEASURE_TOOLS.includes(tool) && !isPick;
   if (!isMeasuring && tool !== 'pick' && !isPick) return;
   lastPick = pickAfter(lastPick, pixel);
-  const point = await lastPick;
+  const { point, error } = await lastPick;
   if (viewer.tool !== tool) return;
-  if (!point) showToast('There is no point here.');
+  if (error) showToast(error.message);
+  else if (!point) showToast('There is no point here.');
   else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);
   else pickCard.show(point);
 }
@@ -168,11 +170,11 @@ function showLinkedMeasurements() {
   if (link.measurements.length) measureTool.figures = link.measurements.splice(0);
 }
 
-/** Sends a pick at once; resolves after the pick before it, so that points come in the order of the clicks. */
+/** Sends a pick at once; resolves to its `{ point }` or `{ error }` after the pick before it, so that points come in the order of the clicks. */
 async function pickAfter(previous, pixel) {
-  const point = viewer.pick(pixel);
+  const picked = viewer.pick(pixel).then((point) => ({ point }), (error) => ({ error }));
   await previous;
-  return point;
+  return picked;
 }
 
 /** Finishes the figure after the answer to the last pick, which adds its last point. */

@@ -80,7 +80,8 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
     if (!wheel || WHEEL_PAUSE_MS < now - wheel.at) {
       wheel = { client: clientOf(event), target: null };
       const started = wheel;
-      viewer.pick(pixel).then((point) => { started.target = point?.surface ?? null; });
+      // Without an answer the zoom is toward the pixel.
+      viewer.pick(pixel).then((point) => { started.target = point?.surface ?? null; }, () => {});
     }
     wheel.at = now;
     const pixels = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : event.deltaY * LINE_PIXELS;

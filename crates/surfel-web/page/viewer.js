@@ -209,13 +209,9 @@ export class Viewer {
     });
   }
 
-  /** The point behind a pixel; null if there is no surface, or if the server did not answer. */
+  /** The point behind a pixel; null if there is no surface. Rejects with the reason if the server does not answer. */
   async pick({ x, y }) {
-    try {
-      return (await this.request({ type: 'pick', x, y })).point;
-    } catch {
-      return null;
-    }
+    return (await this.request({ type: 'pick', x, y })).point;
   }
 
   /** Records that a picture was drawn, and acknowledges it. */
