@@ -152,6 +152,10 @@ test('a film is cancelled, and wrong ones are refused', async () => {
   await page.locator('[data-action="film"]').click();
   await page.locator('[data-action="cancel-film"]').click();
   await page.locator('.film .note', { hasText: 'Cancelled.' }).waitFor();
+  await setFilm({ width: 800.5 });
+  await page.locator('[data-action="film"]').click();
+  await page.locator('[data-film="width"]:invalid:focus').waitFor();
+  assert.ok(await page.locator('[data-action="cancel-film"]').isHidden());
   await setFilm({ width: 32000, height: 32000 });
   await page.locator('[data-action="film"]').click();
   await page.locator('.film .note', { hasText: 'expected' }).waitFor();

@@ -50,8 +50,12 @@ export function connectedViewer() {
       for (const run of timers.splice(0)) run();
     },
   };
-  /** Lets the page send what waits for the next animation frame. */
-  const nextFrame = () => { for (const run of frames.splice(0)) run(); };
+  let now = 0;
+  /** Lets the page send what waits for the next animation frame, which is this much later. */
+  const nextFrame = (interval_ms = 1000 / 60) => {
+    now += interval_ms;
+    for (const run of frames.splice(0)) run(now);
+  };
   server.welcome();
   nextFrame();
   return { viewer, server, nextFrame };

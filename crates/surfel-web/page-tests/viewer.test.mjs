@@ -84,3 +84,16 @@ test('a pick tells no surface from no answer', async () => {
   assert.equal(await sky, null);
   await assert.rejects(refused, /too many questions/);
 });
+
+test('a fast screen does not send more than the server takes', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  for (let i = 0; i < 240; i++) {
+    viewer.setCamera(camera(i), true);
+    viewer.changeSettings({ time: i }, true);
+    nextFrame(1000 / 240);
+  }
+  nextFrame();
+  const n = server.sent('camera').length;
+  assert.ok(100 < n && n <= 126, `${n} messages in a second`);
+  assert.deepEqual(server.sent('camera').at(-1).camera.position, [239, 0, 0]);
+});

@@ -7,8 +7,8 @@ const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'anim
 
 /** `sceneFile` is the button beside those of the film. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
 export function setUpFilmExport(viewer, sceneFile) {
-  const number = (label, key, value, max) => element('input', { type: 'number', min: 1, max, step: 1, value, 'aria-label': label, 'data-film': key });
-  const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120)];
+  const number = (label, key, value, max, step = 1) => element('input', { type: 'number', min: 1, max, step, value, 'aria-label': label, 'data-film': key });
+  const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120, 'any')];
   const format = element('select', { 'aria-label': 'Format of the film', 'data-film': 'format' },
     ...Object.entries(FORMATS).map(([value, label]) => element('option', { value }, label)));
   const bar = element('progress', { max: 1, 'aria-label': 'Progress of the film', hidden: true });
@@ -32,6 +32,7 @@ export function setUpFilmExport(viewer, sceneFile) {
   const size = () => ({ width: width.valueAsNumber || 1280, height: height.valueAsNumber || 720 });
 
   const write = async () => {
+    if (![width, height, fps].every((field) => field.reportValidity())) return;
     link.hidden = true;
     bar.removeAttribute('value');
     show(true, 'Waiting');

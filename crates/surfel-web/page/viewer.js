@@ -8,6 +8,8 @@ import { rejectionText } from './rejections.js';
 import { signal } from './signal.js';
 
 const MAX_LATENCIES = 600;
+/** Minimum duration between two messages about the view: some screens show more pictures a second than the server takes. */
+const MIN_FLUSH_INTERVAL_MS = 8;
 /** Requests for what the view shows: they are sent once all changes before them have taken effect. */
 const VIEW_REQUESTS = ['export', 'save', 'film', 'points'];
 
@@ -47,6 +49,7 @@ export class Viewer {
   #connection;
   #seq = 0;
   #flushRequest = 0;
+  #flushedAt = -Infinity;
   #queuedPatch = null;
   #queuedCamera = null;
   #isMoving = false;
@@ -243,11 +246,18 @@ export class Viewer {
   }
 
   #scheduleFlush() {
-    this.#flushRequest ||= requestAnimationFrame(() => this.#flush());
+    this.#flushRequest ||= requestAnimationFrame((now) => {
+      this.#flushRequest = 0;
+      if (now - this.#flushedAt < MIN_FLUSH_INTERVAL_MS) {
+        this.#scheduleFlush();
+        return;
+      }
+      this.#flushedAt = now;
+      this.#flush();
+    });
   }
 
   #flush() {
-    this.#flushRequest = 0;
     if (!this.isConnected) return;
     if (this.#queuedPatch) {
       const { patch, isMoving } = this.#queuedPatch;

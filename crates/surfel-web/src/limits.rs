@@ -46,9 +46,9 @@ pub struct Limits {
     pub max_added_bytes: u64,
     /// Maximum size of one page's settings changes that have not taken effect, in bytes.
     pub max_pending_bytes: usize,
-    /// Maximum number of messages a second that a page may send in the long run.
+    /// Maximum number of messages a second, acknowledgements aside, that a page may send in the long run.
     pub max_message_rate: f64,
-    /// Maximum number of messages that a page may send at once.
+    /// Maximum number of messages, acknowledgements aside, that a page may send at once.
     pub max_message_burst: f64,
     /// Durations after which the server stops waiting.
     pub timeouts: Timeouts,

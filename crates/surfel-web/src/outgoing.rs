@@ -30,6 +30,20 @@ pub enum RequestRef {
     Seq(u32),
 }
 
+impl RequestRef {
+    /// The request that a page's message makes, as far as it can be read.
+    pub fn of(message: &Message) -> Self {
+        let text = message.to_text().unwrap_or_default();
+        let message: Value = serde_json::from_str(text).unwrap_or_default();
+        let number = |key: &str| message[key].as_u64().and_then(|found| found.try_into().ok());
+        match (number("id"), number("seq")) {
+            (Some(id), _) => Self::Id(id),
+            (None, Some(seq)) => Self::Seq(seq),
+            (None, None) => Self::Unnumbered,
+        }
+    }
+}
+
 /// Sends what is queued. Ends if the connection's write timeout passes, or once all senders are gone.
 pub async fn write(
     mut sink: SplitSink<WebSocket, Message>,

@@ -107,22 +107,28 @@ impl Session {
             if self.out.is_closed() || self.state.is_stopped() {
                 return;
             }
-            if !limiter.allows(Instant::now()) {
-                if !std::mem::replace(&mut is_flooding, true) {
-                    self.reject_text("too many messages; some are ignored").await;
+            let parsed = match &message {
+                Message::Text(text) => Incoming::parse(text),
+                Message::Binary(_) => Err(Error::invalid_request("expected text, found bytes")),
+                Message::Close(_) => return,
+                Message::Ping(_) | Message::Pong(_) => continue,
+            };
+            // A picture whose acknowledgement is ignored would count as on its way for ever.
+            if matches!(parsed, Ok(Incoming::Ack { .. })) || limiter.allows(Instant::now()) {
+                is_flooding = false;
+                match parsed {
+                    Ok(message) => self.handle(message).await,
+                    Err(error) => self.reject(RequestRef::of(&message), &error).await,
                 }
                 continue;
             }
-            is_flooding = false;
-            match message {
-                Message::Text(text) => match Incoming::parse(&text) {
-                    Ok(message) => self.handle(message).await,
-                    Err(error) => self.reject(RequestRef::Unnumbered, &error).await,
-                },
-                Message::Binary(_) => self.reject_text("expected text, found bytes").await,
-                Message::Close(_) => return,
-                Message::Ping(_) | Message::Pong(_) => {}
+            let request = RequestRef::of(&message);
+            // Each request is answered; one error is enough for all other messages of a flood.
+            if !is_flooding || !matches!(request, RequestRef::Unnumbered) {
+                let text = "too many messages; this one is ignored";
+                self.reject(request, &Error::invalid_request(text)).await;
             }
+            is_flooding = true;
         }
     }
 

@@ -257,6 +257,40 @@ async fn floods_of_requests_do_not_block_other_pages() {
 }
 
 #[tokio::test]
+async fn floods_are_answered_and_pictures_go_on() {
+    let limits = Limits { max_message_rate: 1.0, max_message_burst: 20.0, ..Limits::default() };
+    let server = TestServer::start_with_limits(limits);
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.message("scene").await;
+    for seq in 1..=40 {
+        page.change_settings(seq, json!({ "tint": seq })).await;
+    }
+    for id in 1..=3 {
+        page.send_json(json!({ "type": "histogram", "id": id, "column": "z" })).await;
+    }
+    for id in 1..=3 {
+        let answer = page.message_of(id).await;
+        assert!(answer["text"].as_str().unwrap().contains("too many messages"), "{answer}");
+    }
+    // Acknowledgements count for nothing: all pictures of the last change arrive.
+    page.finished_picture().await;
+}
+
+#[tokio::test]
+async fn messages_with_wrong_fields_are_answered() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    let film =
+        json!({ "type": "film", "id": 7, "format": "gif", "width": 1280.5, "height": 2, "fps": 5 });
+    page.send_json(film).await;
+    assert_eq!(page.message("error").await["id"], 7);
+    page.send_json(json!({ "type": "set", "seq": 8, "scene": [] })).await;
+    assert_eq!(page.message("error").await["seq"], 8);
+    page.send_json(json!({ "type": "dance", "id": -1 })).await;
+    assert_eq!(page.message("error").await["id"], Value::Null);
+}
+
+#[tokio::test]
 async fn pending_changes_beyond_the_limit_are_rejected() {
     let server =
         TestServer::start_with_limits(Limits { max_pending_bytes: 5000, ..Limits::default() });
