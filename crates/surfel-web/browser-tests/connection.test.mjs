@@ -68,6 +68,22 @@ test('a page without changes shows the same picture after reconnecting', async (
   assert.equal(await pixels(page), screen);
 });
 
+test('a server that is started again with other data shows their initial view', async () => {
+  const server = await serve(['moving.toml'], ...QUICK);
+  const page = await openTracked(server.link);
+  await drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.5));
+  await page.locator('[data-action="play"]').click();
+  await page.waitForFunction(() => 0.1 < window.surfel.state.scene.time);
+  await server.stop();
+  await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  await serve(['town.ply'], '--port', server.port, ...QUICK);
+  await page.waitForFunction(() => window.surfel.state.connected && window.surfel.state.lastFrame?.finished);
+  const fresh = await openTracked(server.link);
+  assert.deepEqual(await state(page, 'camera'), await state(fresh, 'camera'));
+  assert.deepEqual(await state(page, 'scene'), await state(fresh, 'scene'));
+  assert.equal(await pixels(page), await pixels(fresh));
+});
+
 test('two pages have views of their own, and one survives the other', async () => {
   const server = await serve(['town.ply'], ...QUICK);
   const [one, other] = [await openTracked(server.link), await openTracked(server.link)];

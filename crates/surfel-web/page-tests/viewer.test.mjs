@@ -97,3 +97,39 @@ test('a fast screen does not send more than the server takes', () => {
   assert.ok(100 < n && n <= 126, `${n} messages in a second`);
   assert.deepEqual(server.sent('camera').at(-1).camera.position, [239, 0, 0]);
 });
+
+test('a server with other data gets none of the old view, and its camera is shown', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  let nReplaced = 0;
+  viewer.viewReplaced.listen(() => { nReplaced += 1; });
+  assert.equal(server.sent('hello')[0].name, undefined);
+  viewer.setCamera(camera(1), true);
+  nextFrame();
+  viewer.changeSettings({ color: 'class' });
+  server.close();
+  viewer.setCamera(camera(2), true);
+  const scene = { color: 'elevation', camera: camera(7) };
+  server.welcome({ name: 'valley' }, scene);
+  const [hello] = server.sent('hello');
+  assert.deepEqual([hello.name, hello.scene.color], ['town', 'class']);
+  assert.equal(nReplaced, 1);
+  assert.deepEqual([viewer.scene.color, viewer.camera.position], ['elevation', [7, 0, 0]]);
+  nextFrame();
+  assert.deepEqual([server.sent('camera').length, server.sent('set').length], [0, 0]);
+  // Another answer of the server moves the camera.
+  server.send({ type: 'scene', number: 2, seq: 0, scene, camera: camera(8), legend: null });
+  assert.deepEqual(viewer.camera.position, [8, 0, 0]);
+});
+
+test('a server with the same data gets the view, and changes made without a connection', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  viewer.changeSettings({ color: 'class' });
+  nextFrame();
+  server.close();
+  viewer.setCamera(camera(2), false);
+  server.welcome({}, { ...SCENE, color: 'class' });
+  nextFrame();
+  assert.equal(server.sent('hello')[0].scene.color, 'class');
+  assert.deepEqual(server.sent('camera')[0].camera.position, [2, 0, 0]);
+  assert.deepEqual(viewer.camera.position, [2, 0, 0]);
+});

@@ -242,7 +242,8 @@ export class Viewer {
   }
 
   #sendHello() {
-    this.#connection.send({ type: 'hello', ...this.size, scene: this.#helloPatch });
+    // A link applies to any data, the state of this page to those that it shows.
+    this.#connection.send({ type: 'hello', ...this.size, scene: this.#helloPatch, name: this.info?.name });
   }
 
   #scheduleFlush() {
@@ -304,13 +305,17 @@ export class Viewer {
 
   #receiveWelcome({ scene, info }) {
     const isOtherData = this.info?.name !== info.name;
-    if (isOtherData && this.info) this.viewReplaced();
+    if (isOtherData && this.info) {
+      this.viewReplaced();
+      this.#helloPatch = {};
+    }
     const ofFiles = info.bounds;
     Object.defineProperty(info, 'bounds', { get: () => boxAround([ofFiles, ...this.addedObjects.map(({ bounds }) => bounds)]) });
     this.info = info;
     this.initialScene = scene;
     this.#confirmedScene = mergePatch(scene, this.#helloPatch);
     [this.#sceneNumber, this.lastFrame] = [null, null];
+    if (isOtherData) [this.#queuedPatch, this.#queuedCamera, this.#isMoving] = [null, null, false];
     [this.#pendingPatches, this.#loadId] = [[], null];
     // Messages of an earlier connection have no effect on this one.
     this.#lastCameraSeq = 0;
@@ -318,7 +323,6 @@ export class Viewer {
     // The first scene message carries the position of an animated camera.
     if (isOtherData) this.camera = info.camera_moves && !this.scene.camera.lock ? null : this.scene.camera;
     this.#cameraBySeq.set(this.#seq, this.camera);
-    if (isOtherData) [this.#queuedPatch, this.#queuedCamera, this.#isMoving] = [null, null, false];
     this.isConnected = true;
     this.connectionChanged({ isConnected: true });
     // Sends the changes made while there was no connection.

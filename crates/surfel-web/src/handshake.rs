@@ -8,18 +8,29 @@ use futures_util::StreamExt;
 use futures_util::stream::SplitStream;
 use tokio::time::timeout;
 
-/// The picture size and the settings in a page's first message; none if the page goes away or sends nothing.
+/// The content of a page's first message.
+pub struct Hello {
+    /// Size of the picture in pixels.
+    pub size: (u32, u32),
+    /// A patch of the initial settings.
+    pub patch: SettingsMap,
+    /// Name of the data to which the patch belongs; none if it belongs to any.
+    pub name: Option<String>,
+}
+
+/// A page's first message; none if the page goes away or sends nothing.
 pub async fn handshake(
     stream: &mut SplitStream<WebSocket>,
     limits: &Limits,
-) -> Option<Result<((u32, u32), SettingsMap)>> {
+) -> Option<Result<Hello>> {
     let first = timeout(limits.timeouts.request, first_message(stream)).await.ok()??;
     let Message::Text(text) = first else {
         return Some(Err(Error::invalid_request("expected hello")));
     };
     Some(Incoming::parse(&text).and_then(|message| match message {
-        Incoming::Hello { width, height, scene } => {
-            limits.check_view_size(width, height).map(|()| ((width, height), scene))
+        Incoming::Hello { width, height, scene, name } => {
+            let hello = Hello { size: (width, height), patch: scene, name };
+            limits.check_view_size(width, height).map(|()| hello)
         }
         _ => Err(Error::invalid_request("expected hello first")),
     }))

@@ -8,12 +8,14 @@ use serde_json::Value;
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type", rename_all = "camelCase")]
 pub enum Incoming {
-    /// The first message: the picture's size in pixels, and a patch of the initial settings.
+    /// The first message: the picture's size in pixels, and a patch of the initial settings. With a name, the patch
+    /// is of the data of this name alone.
     Hello {
         width: u32,
         height: u32,
         #[serde(default)]
         scene: SettingsMap,
+        name: Option<String>,
     },
     /// A new size of the picture in pixels.
     Size { width: u32, height: u32 },

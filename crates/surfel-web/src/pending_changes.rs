@@ -69,7 +69,7 @@ impl PendingChanges {
         }
     }
 
-    /// Puts back a change that was taken and then cancelled; it applies before newer ones.
+    /// Adds a change that applies before those that wait, as one that was taken and then cancelled.
     pub fn requeue(&self, older: SettingsChange) {
         let mut pending = self.lock();
         if let Some(newer) = pending.replace(older) {

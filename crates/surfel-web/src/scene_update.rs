@@ -2,6 +2,7 @@
 
 use crate::camera;
 use crate::client::Client;
+use crate::handshake::Hello;
 use crate::merge_patch::apply_merge_patch;
 use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
 use crate::pending_changes::{PendingChanges, SettingsChange};
@@ -20,12 +21,17 @@ pub async fn run(
     client: Arc<Client>,
     pending: Arc<PendingChanges>,
     out: mpsc::Sender<Outgoing>,
+    hello: Hello,
 ) {
     let Some(provider) = wait_for_provider(&state, &out).await else { return };
     let (width, height) = client.view().size;
     let (for_facts, of_scene) = (state.clone(), provider.clone());
     let facts = move || (of_scene.initial_settings(width, height), for_facts.info(&*of_scene));
     let Ok((settings, info)) = state.run_blocking(facts).await else { return };
+    // A server that was started again may show other data than those of the page's patch.
+    let is_for_these = hello.name.is_none_or(|name| info["name"] == name);
+    let patch = if is_for_these { hello.patch } else { SettingsMap::default() };
+    pending.requeue(SettingsChange { patch, ..SettingsChange::default() });
     let welcome = json!({ "type": "welcome", "scene": settings, "info": info });
     send_json(&out, &welcome).await;
     let shows_preview = false;

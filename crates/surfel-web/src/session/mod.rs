@@ -41,15 +41,16 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
     let timeouts = state.limits.timeouts;
     let mut writer = tokio::spawn(write(sink, queue, timeouts.ping_interval));
     match handshake(&mut stream, &state.limits).await {
-        Some(Ok((size, patch))) => {
+        Some(Ok(hello)) => {
             let pending = Arc::new(PendingChanges::new(state.limits.max_pending_bytes));
-            let client = Arc::new(Client::new(size, out.clone()));
+            let client = Arc::new(Client::new(hello.size, out.clone()));
             let _guard = state.register(client.clone());
             let updates = tokio::spawn(scene_update::run(
                 state.clone(),
                 client.clone(),
                 pending.clone(),
                 out.clone(),
+                hello,
             ));
             let queries = Arc::new(Semaphore::new(state.limits.max_page_queries));
             let mut session = Session {
@@ -64,7 +65,6 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 files: Arc::default(),
                 last_seq: 0,
             };
-            session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
             session.saves.values().for_each(cancel);
             updates.abort();

@@ -20,6 +20,17 @@ async fn a_page_gets_welcome_scene_and_statistics() {
 }
 
 #[tokio::test]
+async fn settings_of_other_data_are_ignored() {
+    let server = TestServer::start();
+    for (name, tint) in [("hill", 3), ("valley", 0)] {
+        let mut page = TestPage::connect(&server).await.unwrap();
+        let hello = json!({ "type": "hello", "width": 64, "height": 48, "scene": { "tint": 3 }, "name": name });
+        page.send_json(hello).await;
+        assert_eq!(page.message("scene").await["scene"]["tint"], tint, "{name}");
+    }
+}
+
+#[tokio::test]
 async fn settings_arrive_before_their_first_picture() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;
