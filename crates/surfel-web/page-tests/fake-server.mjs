@@ -15,6 +15,39 @@ class FakeSocket {
   send(text) {
     this.sent.push(JSON.parse(text));
   }
+
+  close() {
+    this.readyState = 3;
+  }
+}
+
+/** Timers that run when the test advances the time. */
+class FakeTimers {
+  now_ms = 0;
+  #timers = new Map();
+  #lastId = 0;
+
+  set(run, wait_ms, interval_ms = Infinity) {
+    this.#timers.set(++this.#lastId, { run, at: this.now_ms + wait_ms, interval_ms });
+    return this.#lastId;
+  }
+
+  clear(id) {
+    this.#timers.delete(id);
+  }
+
+  advance(duration_ms) {
+    const end = this.now_ms + duration_ms;
+    for (;;) {
+      const [[id, timer] = []] = [...this.#timers].sort(([, a], [, b]) => a.at - b.at);
+      if (!timer || end < timer.at) break;
+      this.now_ms = timer.at;
+      timer.at += timer.interval_ms;
+      if (timer.at === Infinity) this.clear(id);
+      timer.run();
+    }
+    this.now_ms = end;
+  }
 }
 
 export const CAMERA = { position: [0, -5, 3], focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 35 };
@@ -24,12 +57,17 @@ const INFO = { name: 'town', bounds: { min: [0, 0, 0], max: [1, 1, 1] }, limits:
 /** A viewer, and the server's end of its connection. */
 export function connectedViewer() {
   const frames = [];
-  const timers = [];
+  const timers = new FakeTimers();
+  const page = new EventTarget();
   Object.assign(globalThis, {
     location: { protocol: 'http:', host: 'host' },
     WebSocket: FakeSocket,
     requestAnimationFrame: (run) => frames.push(run),
-    setTimeout: (run) => timers.push(run),
+    setTimeout: (run, wait_ms) => timers.set(run, wait_ms),
+    clearTimeout: (id) => timers.clear(id),
+    setInterval: (run, wait_ms) => timers.set(run, wait_ms, wait_ms),
+    window: page,
+    document: page,
   });
   const viewer = new Viewer({});
   viewer.connect();
@@ -45,11 +83,12 @@ export function connectedViewer() {
     },
     /** Ends the connection; the page opens another one. */
     close() {
-      FakeSocket.newest.readyState = 3;
+      FakeSocket.newest.close();
       FakeSocket.newest.onclose();
-      for (const run of timers.splice(0)) run();
+      timers.advance(5000);
     },
   };
+  const wait = (duration_ms) => timers.advance(duration_ms);
   let now = 0;
   /** Lets the page send what waits for the next animation frame, which is this much later. */
   const nextFrame = (interval_ms = 1000 / 60) => {
@@ -58,5 +97,5 @@ export function connectedViewer() {
   };
   server.welcome();
   nextFrame();
-  return { viewer, server, nextFrame };
+  return { viewer, server, nextFrame, page, wait };
 }

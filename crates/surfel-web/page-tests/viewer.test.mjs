@@ -133,3 +133,45 @@ test('a server with the same data gets the view, and changes made without a conn
   assert.deepEqual(server.sent('camera')[0].camera.position, [2, 0, 0]);
   assert.deepEqual(viewer.camera.position, [2, 0, 0]);
 });
+
+test('a connection that brings nothing is given up, and the view is kept', () => {
+  const { viewer, server, nextFrame, page, wait } = connectedViewer();
+  const losses = [];
+  viewer.connectionChanged.listen(({ isConnected }) => losses.push(isConnected));
+  for (let i = 0; i < 10; i++) {
+    wait(10_000);
+    server.send({ type: 'pong' });
+  }
+  assert.deepEqual([losses, server.sent('ping').length], [[], 10]);
+  viewer.changeSettings({ color: 'class' });
+  nextFrame();
+  page.dispatchEvent(new Event('online'));
+  wait(19_000);
+  assert.deepEqual(losses, []);
+  wait(3_000);
+  assert.deepEqual(losses, [false]);
+  server.welcome();
+  assert.deepEqual([losses, server.sent('hello')[0].scene.color], [[false, true], 'class']);
+});
+
+test('a saved picture may take long to arrive', () => {
+  const { viewer, server, wait } = connectedViewer();
+  let isLost = false;
+  viewer.connectionChanged.listen(() => { isLost = true; });
+  viewer.request({ type: 'save', width: 9, height: 9 }).catch(() => {});
+  wait(100_000);
+  assert.ok(!isLost);
+  const [{ id }] = server.sent('save');
+  server.send({ type: 'error', id, text: 'too large' });
+  wait(35_000);
+  assert.ok(isLost);
+});
+
+test('a connection that is never opened is given up', () => {
+  const { viewer, server, wait } = connectedViewer();
+  let nAttempts = 0;
+  viewer.connectionChanged.listen(() => { nAttempts += 1; });
+  server.close();
+  wait(50_000);
+  assert.equal(nAttempts, 3);
+});

@@ -2,6 +2,10 @@
 
 const MIN_RECONNECT_DELAY_MS = 500;
 const MAX_RECONNECT_DELAY_MS = 5000;
+/** Interval between two questions whether the server answers; browsers do not report connections that bring nothing. */
+const PING_INTERVAL_MS = 10_000;
+/** Duration without an answer after which a connection is given up. A large picture may arrive before the answer. */
+const MAX_SILENCE_MS = 20_000;
 const HEADER_BYTES = 20;
 /** Rectangle and length before each file of a picture. */
 const PLACE_BYTES = 12;
@@ -48,22 +52,39 @@ export function socketAddress({ protocol, host }) {
 export class Connection {
   #socket = null;
   #reconnectDelay_ms = MIN_RECONNECT_DELAY_MS;
+  /** Timer that gives the connection up; zero while no answer is awaited. */
+  #silenceTimer = 0;
 
-  /** `on` has `opened()`, `message(object)`, `picture(header, files)`, `saved(id, blob)` and `lost(wait_ms)`. */
+  /**
+   * `on` has `opened()`, `message(object)`, `picture(header, files)`, `saved(id, blob)`, `lost(wait_ms)` and
+   * `awaitsFile()`, which says whether a saved picture may be on its way: it arrives as one message.
+   */
   constructor(address, on) {
     this.address = address;
     this.on = on;
   }
 
-  open() {
+  /** Connects, and again whenever the connection is lost. */
+  start() {
+    this.#open();
+    setInterval(() => this.#ping(), PING_INTERVAL_MS);
+    // After a sleep, or in another network, the connection may be dead.
+    window.addEventListener('online', () => this.#ping());
+    document.addEventListener('visibilitychange', () => { if (!document.hidden) this.#ping(); });
+  }
+
+  #open() {
     const socket = new WebSocket(this.address);
+    this.#awaitAnswer(socket);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
+      this.#endSilence();
       // Set here and not earlier: a message sent before this event would arrive before hello.
       this.#socket = socket;
       this.on.opened();
     };
     socket.onmessage = ({ data }) => {
+      this.#endSilence();
       // The delay is reset by a message, not by opening: a server that closes each connection at once must not be
       // asked twice a second.
       this.#reconnectDelay_ms = MIN_RECONNECT_DELAY_MS;
@@ -79,6 +100,26 @@ export class Connection {
     return isOpen;
   }
 
+  #ping() {
+    if (this.send({ type: 'ping' })) this.#awaitAnswer(this.#socket);
+  }
+
+  #awaitAnswer(socket) {
+    this.#silenceTimer ||= setTimeout(() => {
+      this.#silenceTimer = 0;
+      if (this.on.awaitsFile()) return;
+      // A dead connection takes a minute to close.
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+      this.#reconnect();
+    }, MAX_SILENCE_MS);
+  }
+
+  #endSilence() {
+    clearTimeout(this.#silenceTimer);
+    this.#silenceTimer = 0;
+  }
+
   #receive(data) {
     if (typeof data === 'string') {
       this.on.message(JSON.parse(data));
@@ -90,8 +131,10 @@ export class Connection {
   }
 
   #reconnect() {
+    this.#endSilence();
+    this.#socket = null;
     this.on.lost(this.#reconnectDelay_ms);
-    setTimeout(() => this.open(), this.#reconnectDelay_ms);
+    setTimeout(() => this.#open(), this.#reconnectDelay_ms);
     this.#reconnectDelay_ms = Math.min(MAX_RECONNECT_DELAY_MS, 2 * this.#reconnectDelay_ms);
   }
 }

@@ -77,11 +77,12 @@ export class Viewer {
       picture: (header, files) => this.pictureReceived(header, files),
       saved: (id, blob) => this.#resolveRequest({ id, blob }),
       lost: (wait_ms) => this.#handleLoss(wait_ms),
+      awaitsFile: () => [...this.#requests.values()].some(({ type }) => type === 'save'),
     });
   }
 
   connect() {
-    this.#connection.open();
+    this.#connection.start();
   }
 
   /** The added files that are shown. */
@@ -202,7 +203,7 @@ export class Viewer {
   request(message, { progress, abort } = {}) {
     const id = ++this.#lastRequestId;
     return new Promise((resolve, reject) => {
-      this.#requests.set(id, { resolve, reject, progress });
+      this.#requests.set(id, { type: message.type, resolve, reject, progress });
       this.#waitingRequests.push({ ...message, id });
       this.#sendRequests();
       abort?.addEventListener('abort', () => {

@@ -35,6 +35,8 @@ pub enum Incoming {
     },
     /// The page has shown this picture, and all before it.
     Ack { frame: u32 },
+    /// A question whether the server answers.
+    Ping,
     /// A request for the point behind a pixel.
     Pick { id: u32, x: f64, y: f64 },
     /// A question which of these points the camera sees.

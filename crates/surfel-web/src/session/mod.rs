@@ -162,6 +162,7 @@ impl Session {
                 self.client.acknowledge(frame);
                 self.state.render_loop.notify();
             }
+            Incoming::Ping => send_json(&self.out, &json!({ "type": "pong" })).await,
             Incoming::Pick { id, x, y } => self.pick(id, (x, y)).await,
             Incoming::Visible { id, points } => self.visible(id, points).await,
             Incoming::Profile { id, points, width, up } => {

@@ -58,6 +58,7 @@ impl Random {
             "camera",
             "set",
             "ack",
+            "ping",
             "pick",
             "profile",
             "volume",

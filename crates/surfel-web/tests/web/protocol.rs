@@ -20,6 +20,14 @@ async fn a_page_gets_welcome_scene_and_statistics() {
 }
 
 #[tokio::test]
+async fn pings_are_answered() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "gated": true })).await;
+    page.send_json(json!({ "type": "ping" })).await;
+    page.message("pong").await;
+}
+
+#[tokio::test]
 async fn settings_of_other_data_are_ignored() {
     let server = TestServer::start();
     for (name, tint) in [("hill", 3), ("valley", 0)] {
