@@ -112,7 +112,7 @@ test('beyond loopback a token is required', async () => {
   }
   const page = await blankPage();
   await page.goto(address);
-  await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  await page.locator('#banner', { hasText: 'no connection to the server (token: missing or wrong' }).waitFor();
   assert.equal(await state(page, 'lastFrame'), null);
   await page.context().close();
   const picture = await fetch(`${address}render?resolution=20x10&token=${token}`);

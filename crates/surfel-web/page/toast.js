@@ -19,15 +19,30 @@ export function showToast(text, cause = text) {
   setTimeout(() => toast.remove(), TOAST_MS);
 }
 
+/** Why the server refuses connections; empty if it does not, or if it cannot be reached. */
+async function refusalReason() {
+  try {
+    return (await (await fetch('ws')).json()).error ?? '';
+  } catch {
+    return '';
+  }
+}
+
 /** Shows the state of the connection, and the server's rejections. */
 export function setUpNotifications(viewer) {
   const banner = document.getElementById('banner');
-  viewer.connectionChanged.listen(({ isConnected, wait_ms }) => {
+  let lastReason = '';
+  viewer.connectionChanged.listen(async ({ isConnected, wait_ms }) => {
     banner.hidden = isConnected;
     document.body.classList.toggle('is-offline', !isConnected);
     if (isConnected) return;
     const seconds = wait_ms < 1000 ? 'a moment' : `${Math.round(wait_ms / 1000)} s`;
-    banner.textContent = `There is no connection to the server. The next attempt is in ${seconds}.`;
+    const show = (reason) => {
+      banner.textContent = `There is no connection to the server${reason && ` (${reason})`}. The next attempt is in ${seconds}.`;
+    };
+    show(lastReason);
+    lastReason = await refusalReason();
+    show(lastReason);
   });
   viewer.rejected.listen((rejection) => showToast(rejectionText(rejection), rejection.key));
 }

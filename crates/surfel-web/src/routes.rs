@@ -11,6 +11,7 @@ use crate::server_state::ServerState;
 use crate::session;
 use axum::body::{Body, to_bytes};
 use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{Extension, Path, Query, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state, map_response};
@@ -122,15 +123,18 @@ async fn page_file(
     page::file(&name, &headers, &state.guard.frame_ancestors)
 }
 
+/// The connection of a page. A request without an upgrade learns whether a page could connect, since browsers do not
+/// show pages the answer to one with an upgrade.
 async fn socket(
     State(state): State<Arc<ServerState>>,
     Extension(connection): Extension<Arc<ConnectionEntry>>,
-    upgrade: WebSocketUpgrade,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> RouteResult {
     let Ok(permit) = state.page_permits.clone().try_acquire_owned() else {
         let text = "too many pages are open; close another one or try again later";
         return Err(Failure(StatusCode::SERVICE_UNAVAILABLE, text.into()));
     };
+    let Ok(upgrade) = upgrade else { return Ok(StatusCode::NO_CONTENT.into_response()) };
     let max_bytes = state.limits.max_message_bytes;
     let upgrade = upgrade.max_message_size(max_bytes).max_frame_size(max_bytes);
     Ok(upgrade.on_upgrade(async move |socket| {

@@ -52,6 +52,17 @@ async fn programs_get_pictures_settings_and_statistics() {
 }
 
 #[tokio::test]
+async fn a_page_that_cannot_connect_learns_why() {
+    let server = TestServer::start_with_limits(Limits { max_pages: 1, ..Limits::default() });
+    assert_eq!(get(&server, "/ws").await.status, 204);
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.message("welcome").await;
+    let refused = get(&server, "/ws").await;
+    assert_eq!(refused.status, 503);
+    assert!(refused.json()["error"].as_str().unwrap().contains("too many pages"));
+}
+
+#[tokio::test]
 async fn invalid_queries_are_errors() {
     let server = TestServer::start();
     server.assert_serves_pictures().await;
