@@ -28,6 +28,10 @@ class FakeElement {
     else this[name] = value;
   }
 
+  removeAttribute(name) {
+    delete this[name];
+  }
+
   append(...children) {
     this.children.push(...children);
   }

@@ -23,26 +23,26 @@ export function setUpAddedFiles(viewer) {
     else bar.removeAttribute('value');
   };
 
-  /** Sends the bytes of a file to an address of the server. */
-  const send = (address, file, signal) => {
+  /** Sends the bytes of a file to an address of the server; a failure aborts `adding`, which may be over by then. */
+  const send = (address, file, adding) => {
     const request = new XMLHttpRequest();
     request.open('POST', address);
     request.upload.onprogress = ({ loaded, total }) => show(`Sending, ${fileSize(loaded)} of ${fileSize(total)}`, loaded / total);
     // A folder, or a file that has changed or vanished since it was chosen.
-    request.onerror = () => abort?.abort(`${file.name} could not be read or sent. A folder cannot be added.`);
-    signal.addEventListener('abort', () => request.abort());
+    request.onerror = () => adding.abort(`${file.name} could not be read or sent. A folder cannot be added.`);
+    adding.signal.addEventListener('abort', () => request.abort());
     request.send(file);
   };
 
   const add = async (file) => {
     const limit = viewer.info.limits.max_added_file_bytes;
     if (limit < file.size) throw new Error(`${file.name} has ${fileSize(file.size)}; files of up to ${fileSize(limit)} can be added.`);
-    const { signal } = abort;
+    const adding = abort;
     const progress = ({ address, done, left_secs }) => {
-      if (address) send(address, file, signal);
+      if (address) send(address, file, adding);
       else show(typeof left_secs === 'number' ? `Reading, ${duration(left_secs)} left` : 'Reading', done);
     };
-    const answer = await viewer.request({ type: 'addFile', name: file.name, n_bytes: file.size }, { progress, abort: signal });
+    const answer = await viewer.request({ type: 'addFile', name: file.name, n_bytes: file.size }, { progress, abort: adding.signal });
     const { id } = answer.file;
     const away = distanceBetween(viewer.info.bounds, answer.file.bounds);
     viewer.addedFiles.set(id, answer.file);
@@ -60,9 +60,11 @@ export function setUpAddedFiles(viewer) {
       try {
         await add(file);
       } catch (error) {
-        const { reason } = abort.signal;
+        const { aborted, reason } = abort.signal;
+        // The bytes of a file that the server has refused are sent no further.
+        abort.abort();
         if (typeof reason === 'string') showToast(reason);
-        else if (abort.signal.aborted) queue = queue.slice(0, 1);
+        else if (aborted) queue = queue.slice(0, 1);
         else showToast(error.message);
       }
       queue.shift();
