@@ -8,6 +8,7 @@ class FakeElement {
   clientWidth = 400;
   clientHeight = 200;
   classList = { add() {}, remove() {}, toggle() {} };
+  style = { setProperty() {} };
   #listeners = {};
 
   constructor(tag) {
@@ -50,6 +51,10 @@ class FakeElement {
 
   closest() {
     return null;
+  }
+
+  contains(other) {
+    return other === this || this.children.some((child) => child instanceof FakeElement && child.contains(other));
   }
 
   getBoundingClientRect() {

@@ -137,6 +137,8 @@ function text(control, change, id) {
     isTyping = false;
     change(field.value.trim(), false);
   });
+  // A text that is typed back to what it was brings no change.
+  field.addEventListener('blur', () => { isTyping = false; });
   const note = control.note ? element('p', { class: 'note', id: `${id}-note` }) : null;
   if (note) field.setAttribute('aria-describedby', note.id);
   const show = (value, viewer) => {

@@ -55,6 +55,7 @@ function createRow(control, viewer, onChange) {
   const error = element('p', { class: 'row-error', role: 'alert', id: `${id}-error`, hidden: true });
   let rejectedValue;
   let isDragging = false;
+  let lastPatch = null;
   const send = (patch, isMoving) => {
     error.hidden = true;
     onChange();
@@ -62,7 +63,14 @@ function createRow(control, viewer, onChange) {
   };
   const change = (value, isMoving) => {
     isDragging = isMoving;
-    send(patchFor(value), isMoving);
+    lastPatch = patchFor(value);
+    send(lastPatch, isMoving);
+  };
+  /** Ends a drag whose field does not report its end, as when a touch becomes a scroll. */
+  const endDrag = () => {
+    if (!isDragging) return;
+    isDragging = false;
+    send(lastPatch, false);
   };
   const field = fieldFactories[control.kind](control, change, id);
   const sceneKey = control.sceneKey ?? control.key;
@@ -92,6 +100,14 @@ function createRow(control, viewer, onChange) {
     if (!areEqual(value, rejectedValue)) error.hidden = true;
     resetButton.classList.toggle('is-idle', !canReset());
   };
+  // The field reports the end of a drag after these events.
+  for (const event of ['pointerup', 'pointercancel']) field.element.addEventListener(event, () => setTimeout(endDrag));
+  field.element.addEventListener('focusout', ({ relatedTarget }) => {
+    if (field.element.contains(relatedTarget)) return;
+    endDrag();
+    // A field does not take over values while it has the focus.
+    if (viewer.scene) update();
+  });
   const showError = (text) => {
     // The rejected value is taken back before; the error stays until the value changes.
     rejectedValue = read(viewer.scene);

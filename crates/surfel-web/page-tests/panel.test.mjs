@@ -1,0 +1,91 @@
+// Rows of the panel: a field takes over the scene's value once the user has left it.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { mergePatch } from '../page/merge-patch.js';
+import { Panel } from '../page/panel.js';
+import { signal } from '../page/signal.js';
+import { fakeDocument } from './fake-dom.mjs';
+
+/** The row of a control, its inputs, and the changes that it makes. */
+function rowOf(control, scene) {
+  const document = fakeDocument();
+  const changes = [];
+  const viewer = {
+    scene, initialScene: scene, sceneChanged: signal(), cameraChanged: signal(), rejected: signal(),
+    changeSettings: (patch, isMoving) => {
+      changes.push({ patch, isMoving });
+      viewer.show(patch);
+    },
+    show: (patch) => {
+      viewer.scene = mergePatch(viewer.scene, patch);
+      viewer.sceneChanged();
+    },
+  };
+  const [row] = new Panel(viewer).addRows([control]);
+  const field = row.children[1];
+  const leave = (to = null) => {
+    document.activeElement = to;
+    field.emit('focusout', { relatedTarget: to });
+  };
+  return { document, viewer, changes, field, inputs: row.all('input'), leave };
+}
+
+const FILTER = { kind: 'text', key: 'filter', label: 'Filter', read: (scene) => scene.filter ?? '' };
+const SPP = { kind: 'slider', key: 'spp', label: 'Samples', range: [0, 100], step: 1 };
+const RANGE = { kind: 'numbers', key: 'range', label: 'Range', names: ['low', 'high'] };
+
+test('a text that is typed back to what it was does not stay', () => {
+  const { viewer, inputs: [input], leave } = rowOf(FILTER, { filter: 'a' });
+  input.emit('input');
+  viewer.show({ filter: 'b' });
+  assert.equal(input.value, 'a');
+  input.emit('blur');
+  leave();
+  assert.equal(input.value, 'b');
+});
+
+test('a number that was not changed shows the new value once it is left', () => {
+  const { document, viewer, inputs: [, number], leave } = rowOf(SPP, { spp: 4 });
+  document.activeElement = number;
+  viewer.show({ spp: 9 });
+  assert.equal(number.value, 4);
+  leave();
+  assert.equal(number.value, 9);
+});
+
+test('numbers that are being entered stay until all of them are left', () => {
+  const { document, inputs: [low, high], leave } = rowOf(RANGE, {});
+  document.activeElement = low;
+  low.value = 5;
+  leave(high);
+  assert.equal(low.value, 5);
+  leave();
+  assert.equal(low.value, '');
+});
+
+test('a drag without an end is ended when the field is left', () => {
+  const { viewer, changes, inputs: [range], leave } = rowOf(SPP, { spp: 4 });
+  range.value = 500;
+  range.emit('input');
+  leave();
+  const [dragged, ended] = changes;
+  assert.deepEqual([dragged.isMoving, ended.isMoving, changes.length], [true, false, 2]);
+  assert.deepEqual(ended.patch, { spp: 50 });
+  viewer.show({ spp: 10 });
+  assert.equal(range.value, 100);
+});
+
+test('a drag that becomes a scroll ends, and one that ends by itself is reported once', () => {
+  for (const [event, ...following] of [['pointercancel'], ['pointerup', 'change']]) {
+    const { changes, field, inputs: [range] } = rowOf(SPP, { spp: 4 });
+    const timers = [];
+    globalThis.setTimeout = (run) => timers.push(run);
+    range.value = 500;
+    range.emit('input');
+    field.emit(event);
+    for (const type of following) range.emit(type);
+    for (const run of timers) run();
+    assert.deepEqual(changes.map(({ isMoving }) => isMoving), [true, false], event);
+  }
+});
