@@ -47,6 +47,10 @@ class FakeElement {
 
   focus() {}
 
+  reportValidity() {
+    return true;
+  }
+
   setPointerCapture() {}
 
   closest() {

@@ -54,6 +54,12 @@ export function setUpFilmExport(viewer, sceneFile) {
     abort = null;
   };
 
+  // The server keeps the film as long as the page is connected.
+  viewer.connectionChanged.listen(() => {
+    if (!link.hidden) show(false, '');
+    link.hidden = true;
+  });
+
   const update = (isNowEmpty) => {
     isEmpty = isNowEmpty;
     if (!abort) start.disabled = isEmpty;

@@ -45,6 +45,11 @@ export function setUpPointsExport(viewer, dialog) {
     abort = null;
   };
 
+  // The server keeps the file as long as the page is connected.
+  viewer.connectionChanged.listen(() => {
+    if (!link.hidden) show(false, '');
+    link.hidden = true;
+  });
   dialog.querySelector('footer').before(part);
   dialog.addEventListener('close', () => abort?.abort());
   return () => {

@@ -61,7 +61,7 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 queries,
                 save_permit: Arc::new(Semaphore::new(1)),
                 saves: HashMap::new(),
-                download: Arc::default(),
+                downloads: Arc::default(),
                 files: Arc::default(),
                 last_seq: 0,
             };
@@ -91,8 +91,8 @@ struct Session {
     save_permit: Arc<Semaphore>,
     /// The cancellation flags of saved pictures and files of points that are not sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
-    /// The file of points that the page requested last.
-    download: Arc<Mutex<Option<DownloadGuard>>>,
+    /// The file of points and the film that the page requested last, by the words for what is in them.
+    downloads: Arc<Mutex<HashMap<&'static str, DownloadGuard>>>,
     /// The files that the page has added.
     files: Arc<PageFiles>,
     /// Sequence number of the last camera or settings change.
@@ -317,7 +317,8 @@ impl Session {
         .await;
     }
 
-    /// Writes a file, which the page then fetches by its name. `count` is the word for what is in it.
+    /// Writes a file, which the page then fetches by its name. `count` is the word for what is in it, and replaces the
+    /// page's file with the same word.
     async fn write_file(
         &mut self,
         id: u32,
@@ -337,7 +338,8 @@ impl Session {
         };
         let is_cancelled: Arc<AtomicBool> = Arc::default();
         self.saves.insert(id, is_cancelled.clone());
-        let (state, out, download) = (self.state.clone(), self.out.clone(), self.download.clone());
+        let (state, out) = (self.state.clone(), self.out.clone());
+        let downloads = self.downloads.clone();
         let permit = self.save_permit.clone();
         tokio::spawn(async move {
             let write = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
@@ -352,8 +354,8 @@ impl Session {
             let message = match kept {
                 Ok((guard, file)) => {
                     let address = format!("points/{}", guard.name);
-                    // The file before it goes.
-                    *download.lock().unwrap_or_else(PoisonError::into_inner) = Some(guard);
+                    // The file of this kind before it goes.
+                    downloads.lock().unwrap_or_else(PoisonError::into_inner).insert(count, guard);
                     json!({ "type": "written", "id": id, "address": address, count: file.n_items(), "n_bytes": file.n_bytes() })
                 }
                 Err(error) => rejection(RequestRef::Id(id), &error),

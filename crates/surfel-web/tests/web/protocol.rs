@@ -320,6 +320,13 @@ async fn points_are_fetched_until_their_page_goes() {
         assert_eq!((&written["id"], &written["n_points"]), (&json!(id), &json!(7)));
         addresses.push(format!("/{}", written["address"].as_str().unwrap()));
     }
+    page.send_json(
+        json!({ "type": "film", "id": 4, "format": "gif", "width": 3, "height": 2, "fps": 5 }),
+    )
+    .await;
+    let film = page.message_of(4).await;
+    assert_eq!((&film["type"], &film["n_frames"]), (&json!("written"), &json!(7)), "{film}");
+    // A film replaces no file of points.
     let file = get(&server, &addresses[1]).await;
     assert_eq!((file.status, file.header("content-length")), (200, Some("1000000")));
     assert_eq!(file.header("content-disposition"), Some("attachment"));
