@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { coordinate, count, counted, duration, exact, fileSize, rounded, shortest, ticks, withUnit } from '../page/format.js';
+import { coordinate, count, counted, duration, exact, fileSize, measured, rounded, shortest, ticks, withUnit } from '../page/format.js';
 import { coordinatesText } from '../page/cursor-coordinates.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
@@ -26,6 +26,12 @@ test('other numbers are rounded', () => {
   assert.equal(duration(200), '3 min 20 s');
   assert.equal(duration(7380), '2 h 3 min');
   assert.deepEqual([0, 640, 12_345_000, 2e15].map(fileSize), ['0\u00a0B', '640\u00a0B', '12.3\u00a0MB', '2\u202f000\u00a0TB']);
+});
+
+test('small measurements keep their digits', () => {
+  const small = [0.000125, 0.0000014, 0.123456789, -0.05];
+  assert.deepEqual(small.map(measured), ['0.000125', '0.0000014', '0.123457', '-0.05']);
+  assert.deepEqual([1e-17, 0, 1.23456789, 12345.678].map(measured), ['0', '0', '1.23457', '12\u202f345.7']);
 });
 
 test('scales have round ticks', () => {

@@ -31,6 +31,11 @@ export function rounded(value, digits = 5) {
   return withSeparators(value, { maximumFractionDigits });
 }
 
+/** A length, area or volume with about six digits, also if it is small. */
+export function measured(value) {
+  return Math.abs(value) < 1 ? withSeparators(Number(value.toPrecision(6)), { maximumFractionDigits: 12 }) : rounded(value, 6);
+}
+
 export function count(value) {
   return withSeparators(value, { maximumFractionDigits: 0 });
 }

@@ -2,7 +2,7 @@
 
 import { copyButton } from './copy.js';
 import { download, element, iconButton } from './dom.js';
-import { exact, rounded, stemOf, withUnit } from './format.js';
+import { exact, measured, rounded, stemOf, withUnit } from './format.js';
 import { KINDS, circleThrough, corner, middle, pathLength, resultsOf } from './measure.js';
 import { borders } from './profile.js';
 import { signal } from './signal.js';
@@ -120,7 +120,7 @@ export class MeasureTool {
     if (dimension === 'percent') return `${rounded(value, 3)} %`;
     if (value === Infinity) return 'straight line';
     const { unit } = this.viewer.info;
-    return withUnit(rounded(value, 6), unit ? `${unit}${POWERS[dimension]}` : unit);
+    return withUnit(measured(value), unit ? `${unit}${POWERS[dimension]}` : unit);
   }
 
   #list() {
