@@ -121,6 +121,10 @@ fn keys_that_options_exclude_are_ignored() {
             "camera = { position = [3, 3, 3], focal-point = [0, 0, 0], view-up = [0, 1, 0] }",
             &["--camera-direction", "0,0,-1", "--camera-orthographic"],
         ),
+        (
+            "camera-azimuth-angle = 30",
+            &["--camera-position", "3,3,3", "--camera-focal-point", "0,0,0"],
+        ),
         ("camera.view_angle = 60", &["--camera-panorama"]),
         ("camera.panorama = true", &["--camera-orthographic"]),
         ("camera.orthographic = true", &["--camera-orthographic=false"]),

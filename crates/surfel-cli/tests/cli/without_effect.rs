@@ -69,6 +69,10 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
         let found = render(&ply, options);
         assert!(found.len() == 1 && found[0].ends_with(ends), "{options:?}: {found:?}");
     }
+    let ends = ["--camera-position", "3,3,3", "--camera-focal-point", "0,0,0"];
+    let found = render(&ply, &[&ends[..], &["--camera-azimuth-angle", "30"]].concat());
+    let keys = "[--camera-azimuth-angle, --camera-position, --camera-focal-point]";
+    assert!(found.len() == 1 && found[0].ends_with(keys), "{found:?}");
     for options in [
         &["--point-size", "8", "--surface", "points"][..],
         &["--reach", "3", "--surface", "mls"],

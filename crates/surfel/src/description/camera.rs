@@ -143,7 +143,7 @@ impl CameraSettings {
     }
 
     /// Returns the key that states a direction of view, if one is set.
-    fn direction_key(&self) -> Option<&'static str> {
+    pub(crate) fn direction_key(&self) -> Option<&'static str> {
         let is_set = [
             ("camera.direction", self.direction.is_some()),
             ("camera.azimuth_angle", self.azimuth_angle.is_some()),
@@ -157,38 +157,43 @@ impl CameraSettings {
         matches!(self.orthographic, Some(OrthographicHeight::Fixed(_)))
     }
 
-    /// Unsets what `over` takes the place of: position, focal point and view-up if it states a direction, which would have
-    /// no effect beside them, the height if it zooms, and the zoom if it states a height.
+    /// Returns true if position and focal point are set, which say in what direction the camera looks.
+    pub(crate) fn has_both_ends(&self) -> bool {
+        self.position.is_some() && self.focal_point.is_some()
+    }
+
+    /// Unsets what `over` takes the place of. A direction replaces position, focal point and view-up, and these replace a
+    /// direction, where it would have no effect; a height and a zoom replace each other.
     pub(super) fn unset_excluded_by(&mut self, over: &Self) {
         if over.has_fixed_height() {
             self.zoom_factor = None;
         } else if over.zoom_factor.is_some() && self.has_fixed_height() {
             self.orthographic = Some(OrthographicHeight::Fit);
         }
-        let is_fixed = (self.position.is_some() || over.position.is_some())
-            && (self.focal_point.is_some() || over.focal_point.is_some());
-        if is_fixed && over.direction_key().is_some() {
+        let mut merged = self.clone();
+        merged.overlay(over);
+        if !merged.has_both_ends() {
+            return;
+        }
+        if over.direction_key().is_some() {
             (self.position, self.focal_point, self.view_up) = Default::default();
+        } else if over.position.is_some() || over.focal_point.is_some() {
+            (self.direction, self.azimuth_angle, self.elevation_angle) = Default::default();
         }
     }
 
-    /// Checks that no zoom stands beside a height, and no direction beside a position and a focal point, which state it
-    /// already.
+    /// Checks that no zoom stands beside a height, and that the camera does not look at its own position.
     pub(super) fn check(&self) -> Result<(), Invalid> {
+        if self.position.is_some() && self.position == self.focal_point {
+            let text = "is the focal point too; move one of them";
+            return Err(Invalid::at("camera.position", text));
+        }
         if self.has_fixed_height() && self.zoom_factor.is_some() {
             let text =
                 "does not change the height that camera.orthographic states; leave out one of them";
             return Err(Invalid::at("camera.zoom_factor", text));
         }
-        let (Some(position), Some(focal_point)) = (self.position, self.focal_point) else {
-            return Ok(());
-        };
-        if position == focal_point {
-            let text = "is the focal point too; move one of them";
-            return Err(Invalid::at("camera.position", text));
-        }
-        let text = "camera.position and camera.focal_point state the direction already; leave out one of the three";
-        self.direction_key().map_or(Ok(()), |key| Err(Invalid::at(key, text)))
+        Ok(())
     }
 
     /// Returns true for an equirectangular picture all around.

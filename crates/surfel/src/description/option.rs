@@ -66,7 +66,8 @@ impl SceneDescription {
     fn defaults_over(&self, base: &Self) -> Vec<(String, Value)> {
         let is_excluded = |path: &str| {
             let mut values = exclusive::excluded_by(path).filter_map(|other| self.get(other));
-            values.any(|value| value != json!(false))
+            let is_stated = path == "camera.azimuth_angle" && self.camera.has_both_ends();
+            is_stated || values.any(|value| value != json!(false))
         };
         let keys = Self::keys().into_iter();
         let defaults = keys.filter_map(|(path, _, key)| Some((path, key.default?)));

@@ -121,6 +121,16 @@ fn a_direction_over_a_scene_replaces_its_position_and_focal_point() {
         assert_eq!((camera.position, camera.focal_point, camera.view_up), (None, None, None));
         assert_eq!(camera.view_angle, Some(20.0));
     }
+    // A position and a focal point replace a direction, too.
+    for key in ["direction = [0, 0, -1]", "azimuth-angle = 30", "elevation-angle = 30"] {
+        let camera = turned(&format!("[camera]\n{key}"), view);
+        let angles = (camera.azimuth_angle, camera.elevation_angle);
+        assert_eq!((camera.direction, angles), (None, (None, None)), "{key}");
+        assert!(camera.focal_point.is_some() && camera.view_up.is_some());
+    }
+    let base = parse("camera.azimuth-angle = 30").unwrap();
+    let options = parse(view).unwrap().to_options_over(&base);
+    assert!(!options.iter().any(|option| option.contains("azimuth")), "{options:?}");
     // What the upper layer sets itself stays, and a position or a focal point alone leaves the direction open.
     let camera = turned(view, "[camera]\nazimuth-angle = 30\nposition = [7, 8, 9]");
     assert_eq!((camera.position.map(|p| p.x), camera.focal_point), (Some(7.0), None));
@@ -129,15 +139,6 @@ fn a_direction_over_a_scene_replaces_its_position_and_focal_point() {
         let camera = turned(&scene, "camera.azimuth-angle = 30");
         let kept = camera.position.or(camera.focal_point);
         assert_eq!((kept.map(|point| point.z), camera.view_up), (Some(3.0), Some(DVec3::Y)));
-    }
-}
-
-#[test]
-fn a_direction_beside_a_position_and_a_focal_point_is_refused() {
-    let view = "[camera]\nposition = [1, 2, 3]\nfocal-point = [4, 5, 6]";
-    for key in ["direction = [0, 0, -1]", "azimuth-angle = 30", "elevation-angle = 30"] {
-        let found = error(&format!("{view}\n{key}"));
-        assert!(found.contains("state the direction already"), "{found}");
     }
 }
 

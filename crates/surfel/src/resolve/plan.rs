@@ -112,8 +112,7 @@ fn plan_camera(
     up: Vec3,
 ) -> Camera {
     let towards = settings.position.zip(settings.focal_point).map(|(from, to)| to - from);
-    let forward = settings.direction.or(towards);
-    let forward = forward.or_else(|| stated_direction(settings, points, up));
+    let forward = stated_direction(settings, points, up).or(towards);
     let forward = forward.unwrap_or(-up.as_dvec3()).normalize();
     let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
     let focal_point = settings.focal_point.or(settings.position).unwrap_or(middle);

@@ -26,6 +26,13 @@ impl LoadedScene {
             );
             progress.choice(&line, &["noise_threshold", "spp"]);
         }
+        let camera = &description.camera;
+        // A plan looks in the direction, and has its middle at the focal point.
+        let is_turned = !camera.has_both_ends() || description.plan.is_to_scale();
+        if let (Some(key), false) = (camera.direction_key(), is_turned) {
+            let line = "warning: no effect: position and focal point state the direction already";
+            progress.choice(line, &[key, "camera.position", "camera.focal_point"]);
+        }
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
         self.report_unused_of_points(description, progress);
