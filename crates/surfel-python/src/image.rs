@@ -28,7 +28,7 @@ pub struct Shared {
     srgb: OnceLock<Vec<u8>>,
 }
 
-/// What the pixels of a picture lead back to; empty without layers.
+/// The object and the point that each pixel shows; empty without layers.
 #[derive(Default)]
 pub struct PixelIds {
     /// Number of the added object that each pixel shows.

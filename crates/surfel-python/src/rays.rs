@@ -112,8 +112,8 @@ impl RayRows<'_> {
     }
 }
 
-/// Rays at a view. What it says of each ray is in the order of the array.
-pub struct RayQuery<'a> {
+/// Rays that are cast at a view. Each answer is in the order of the array.
+pub struct ViewRays<'a> {
     view: &'a LiveView,
     caster: RayCaster<'a>,
     /// The rays in the order in which they are traced.
@@ -121,7 +121,7 @@ pub struct RayQuery<'a> {
     rows: RayRows<'a>,
 }
 
-impl<'a> RayQuery<'a> {
+impl<'a> ViewRays<'a> {
     /// Rays at a view, of which the part `t_range` counts.
     pub fn new(rows: RayRows<'a>, t_range: (f32, f32), view: &'a LiveView, simd: Simd) -> Self {
         Self { view, caster: view.ray_caster(simd), rays: rows.in_scene(view, t_range), rows }

@@ -7,7 +7,7 @@ use crate::height_map::PyHeightMap;
 use crate::image::{PixelIds, PyImage};
 use crate::object::NewObject;
 use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
-use crate::rays::{RayArray, RayQuery, ray_hits};
+use crate::rays::{RayArray, ViewRays, ray_hits};
 use crate::value::{to_python, with_keys};
 use crate::work;
 use pyo3::prelude::*;
@@ -99,7 +99,7 @@ impl PyScene {
         rays: &RayArray<'_>,
         t_range: (f32, f32),
         progress: Option<&Bound<'_, PyAny>>,
-        query: impl FnOnce(&RayQuery<'_>, &dyn Progress) -> surfel::Result<T> + Send,
+        query: impl FnOnce(&ViewRays<'_>, &dyn Progress) -> surfel::Result<T> + Send,
     ) -> PyResult<T> {
         let py = rays.py();
         let (scene, chosen) = self.open_view(py, None, progress)?;
@@ -111,7 +111,7 @@ impl PyScene {
         rays.with_rows(|rows| {
             work::run(py, progress, |progress| {
                 scene.install(progress, |scene| {
-                    query(&RayQuery::new(rows, t_range, view, scene.simd()), progress)
+                    query(&ViewRays::new(rows, t_range, view, scene.simd()), progress)
                 })
             })
         })
