@@ -263,13 +263,21 @@ def test_threads_share_a_scene_with_threads_of_its_own():
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="threads as Linux lists them")
 def test_a_scene_starts_no_more_threads_than_it_is_given(hill):
-    surfel.load(hill).render(**SMALL)
-    n_threads = lambda: len(os.listdir("/proc/self/task"))
-    before = n_threads()
-    scene = surfel.load(hill, threads=3)
-    scene.render(**SMALL)
-    scene.bounds
-    assert n_threads() - before == 3
+    # Threads that have done their work, and those of scenes that are gone, end some time later.
+    code = f"""
+import os, surfel, time
+def n_threads():
+    time.sleep(0.5)
+    return len(os.listdir("/proc/self/task"))
+first = surfel.load({str(hill)!r})
+first.render(resolution=(8, 8), spp=1)
+before = n_threads()
+scene = surfel.load({str(hill)!r}, threads=3)
+scene.render(resolution=(8, 8), spp=1)
+print(n_threads() - before)
+"""
+    program = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
+    assert program.stdout == "3\n", program.stderr
 
 
 def test_a_scene_has_its_own_number_of_threads(hill):
