@@ -19,7 +19,7 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, FileInfo, LoadOptions, Loaded, SaveOptions, merge_loaded};
 
-/// Cleans a cloud, and adds normals and radii: of a file, of a `Cloud` or what `Cloud` takes, or of several that become one.
+/// Cleans a cloud, and adds normals and radii: of a file, of a `Cloud` or what it takes, or of several that become one.
 ///
 /// Keywords are the keys of preparation in scene files: `filter`, `crop`, `subsample`, `remove_outliers`, `denoise`, `orient`,
 /// `normals_k`, `radius` and others, besides `seed`, `threads` and `memory_limit`. Without any, normals and radii are added;

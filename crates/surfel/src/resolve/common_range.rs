@@ -111,7 +111,7 @@ mod tests {
             let mut cloud = PointCloud::from_positions((0..81).map(point).collect());
             cloud.intensity = Some((0..81).map(|n| n as f32).collect());
             let name = format!("memory:{i}");
-            description.memory.insert(&name, MemoryContent::Points(Arc::new(cloud)));
+            description.memory.insert(&name, MemoryContent::Points(Arc::new(cloud), None));
             let mut table = keys.as_object().unwrap().clone();
             table.insert("file".into(), json!(name));
             description.add_object(&table, Path::new("")).unwrap();
