@@ -23,6 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "environment",
         "obj",
         "stl",
+        "off",
         "mtl",
         "gltf",
         "scene",
@@ -56,6 +57,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "1;2;3;0;6;7;8;9\n",
         "v 1 2 3\nv 1 2 3 1\nf 1 2 1\n",
         "v 1 2 3 0 0.5 1\n",
+        "ncols 3\nnrows 2\nxllcorner 0.5\nyllcenter 1\ncellsize 10\nNODATA_value -1\n1 2 3\n-1 5 6\n",
+        "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (I, P)\n7 1 2 3 4 5 6 0.5 16 65 15\n8 1 2 3 4 5 6 0.5\n",
+        "1,5\t2,5\tNA\n1,5\t2,5\t3\n",
     ];
     for (i, text) in texts.iter().enumerate() {
         fs::write(corpus.join(format!("xyz/{i}")), text)?;
@@ -247,6 +251,9 @@ fn write_meshes(corpus: &Path) -> std::io::Result<()> {
     let facet = [&corners.map(f32::to_le_bytes).concat()[..], &[0; 2]].concat();
     fs::write(corpus.join("stl/facet"), &facet)?;
     fs::write(corpus.join("stl/binary.stl"), [&[b' '; 80][..], &[1, 0, 0, 0], &facet].concat())?;
+    let off = "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 0 0 1 0 1\n1 1 0 1 1 1 1\n0 1 0 9 9 9 9\n4 0 1 2 3\n3 0 1 2 1 1 1\n";
+    fs::write(corpus.join("off/colors.off"), off)?;
+    fs::write(corpus.join("off/normals.off"), "NOFF 3 1 0\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1 # c\n3 0 1 2\n")?;
     let mtl = "newmtl m\nKd 0.5 0.25 1\nKs 0.5\nNs 30\nKe 1 2 3\nTf 1 1 1\nNi 1.5\nd 0.5\nTr 0.5\nillum 7\n\
         Pr 0.5\nPm 1\nmap_Kd -s 2 3 1 -o 0.5 -clamp on -mm 0 1 a.png\nmap_Ke b.png\nnorm -bm 2 c.png\n";
     fs::write(corpus.join("mtl/all.mtl"), mtl)?;

@@ -16,6 +16,7 @@ use crate::gltf;
 use crate::las;
 use crate::mesh::Model;
 use crate::obj;
+use crate::off;
 use crate::options::{FileInfo, LoadOptions, Loaded, SaveOptions};
 use crate::pcd;
 use crate::ply;
@@ -180,6 +181,19 @@ pub const FORMATS: &[Format] = &[
             has_triangles: |input| Ok(obj::has_faces(input)),
             read_points: obj::read,
             read_mesh: obj::read_mesh,
+        },
+        writer: None,
+    },
+    Format {
+        name: "OFF",
+        extensions: &["off"],
+        signature: None,
+        probe: |_| false,
+        inspect: off::inspect,
+        read: Reader::Mesh {
+            has_triangles: off::has_faces,
+            read_points: off::read,
+            read_mesh: off::read_mesh,
         },
         writer: None,
     },

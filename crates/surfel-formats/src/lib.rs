@@ -40,6 +40,7 @@ mod text;
 mod esri_grid;
 mod obj;
 mod stl;
+mod off;
 mod bin;
 mod gltf;
 mod merge;

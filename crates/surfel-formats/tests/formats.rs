@@ -40,6 +40,8 @@ mod salvage;
 mod e57_salvage;
 #[path = "formats/meshes.rs"]
 mod meshes;
+#[path = "formats/off.rs"]
+mod off;
 #[path = "formats/mesh_materials.rs"]
 mod mesh_materials;
 #[path = "formats/malformed_meshes.rs"]

@@ -1,8 +1,7 @@
 //! Reads the meshes of PLY files: vertices with normals, colours and texture coordinates, and their faces.
 
-use surfel_core::image::{decode_srgb, decode_srgb8};
-use surfel_core::math::{Vec2, Vec4};
-use surfel_core::points::{COLOR_8_TO_16, PointCloud, Values};
+use surfel_core::math::Vec2;
+use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Material, Mesh, TextureRef};
 
@@ -11,7 +10,7 @@ use super::header::read_header;
 use super::read::{file_info, find_vertex, read_cloud};
 use crate::error::{Location, Result};
 use crate::file::{Input, ResourceResolver};
-use crate::mesh::{Model, TextureLoader, repair_model, weld};
+use crate::mesh::{Model, TextureLoader, linear_colors, repair_model, weld};
 use crate::options::{FileInfo, LoadOptions};
 use crate::salvage::Salvage;
 use crate::table::{Column, ColumnChoice};
@@ -120,21 +119,4 @@ fn uvs(cloud: &PointCloud) -> Option<Vec<Vec2>> {
         let uv = |i| flip_v(Vec2::new(u.get(i) as f32, v.get(i) as f32));
         Some((0..cloud.len()).map(uv).collect())
     })
-}
-
-/// Returns the colours of the vertices, linear and with alpha.
-fn linear_colors(cloud: &PointCloud) -> Option<Vec<Vec4>> {
-    let colors = cloud.colors.as_ref()?;
-    let alpha = cloud.scalar("alpha");
-    let linear = |channel: u16| match (channel / COLOR_8_TO_16, channel % COLOR_8_TO_16) {
-        // Most files have 8 bits, for which there is a table.
-        (byte, 0) => decode_srgb8(byte as u8),
-        _ => decode_srgb(f32::from(channel) / 65535.0),
-    };
-    let color = |(i, color): (usize, &[u16; 3])| {
-        let [red, green, blue] = color.map(linear);
-        let alpha = alpha.map_or(1.0, |alpha: &Values| alpha.get(i).clamp(0.0, 1.0) as f32);
-        Vec4::new(red, green, blue, alpha)
-    };
-    Some(colors.iter().enumerate().map(color).collect())
 }

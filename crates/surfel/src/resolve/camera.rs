@@ -176,7 +176,7 @@ pub fn up_convention(cloud: &PointCloud, files: &[FileInfo]) -> UpConvention {
 fn format_convention(file: &FileInfo) -> UpConvention {
     let is_any = |names: &[&str]| names.iter().any(|name| file.format.starts_with(name));
     let has_column = |name: &str| file.columns.iter().any(|column| column == name);
-    if is_any(&["LAS", "LAZ", "COPC", "E57", "PTX"]) {
+    if is_any(&["LAS", "LAZ", "COPC", "E57", "PTX", "ESRI"]) {
         UpConvention::Georeferenced
     } else if is_any(&["STL"]) {
         UpConvention::ZUp("STL files".into())

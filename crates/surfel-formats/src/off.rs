@@ -1,0 +1,236 @@
+//! OFF (Geomview): the vertices of a mesh, then its polygons, as lines of text. The first word says whether vertices have
+//! normals and texture coordinates; whatever follows is a colour.
+
+use surfel_core::math::DVec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Material, Mesh};
+use surfel_core::words::counted;
+
+use crate::error::{Error, Location, Result};
+use crate::file::{Input, ResourceResolver};
+use crate::mesh::{Model, linear_colors, relative_to_origin, repair_model};
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::table::{
+    ColorRange, LineError, ParseFault, Tolerance, find_line_end, keep_matching, line_at,
+    parse_number,
+};
+
+/// Number of lines between two looks for cancellation.
+const LINES_PER_CHECK: u64 = 1 << 16;
+const ADVICE: &str = "write the mesh again, as OFF of text or as PLY";
+
+/// The content of the first lines.
+struct Header {
+    has_normals: bool,
+    has_uvs: bool,
+    n_vertices: u64,
+    n_faces: u64,
+}
+
+/// Reads the numbers of vertices and faces.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
+    Ok(file_info(&Body::open(input)?.header))
+}
+
+/// Returns true if the header announces faces.
+pub(crate) fn has_faces(input: &Input) -> Result<bool> {
+    Ok(0 < Body::open(input)?.header.n_faces)
+}
+
+/// Reads the vertices as points.
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    let mut body = Body::open(input)?;
+    let mut cloud = body.read_vertices(options, progress)?;
+    keep_matching(&mut cloud, 0, options.filter.as_ref())?;
+    Ok(Loaded { cloud, info: file_info(&body.header) })
+}
+
+/// Reads the faces as a mesh of triangles.
+pub(crate) fn read_mesh(
+    input: &Input,
+    _: &ResourceResolver,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<(Model, FileInfo)> {
+    let mut body = Body::open(input)?;
+    let cloud = body.read_vertices(options, progress)?;
+    let first_face = body.at;
+    let (triangles, n_short) = body.read_faces(progress)?;
+    let colors = linear_colors(&cloud);
+    let PointCloud { origin, positions, normals, .. } = cloud;
+    let mesh = Mesh { origin, positions, triangles, normals, colors, ..Mesh::default() };
+    let model = Model { parts: vec![(mesh, Material::MATTE)], textures: Vec::new() };
+    let location = line_at(input, first_face);
+    let (model, n_triangles) = repair_model(input, model, n_short, location, progress)?;
+    Ok((model, FileInfo { n_triangles: Some(n_triangles), ..file_info(&body.header) }))
+}
+
+fn file_info(header: &Header) -> FileInfo {
+    FileInfo {
+        format: "OFF".into(),
+        n_points: Some(header.n_vertices),
+        n_triangles: (0 < header.n_faces).then_some(header.n_faces),
+        columns: ["x", "y", "z"].map(String::from).into(),
+        ..FileInfo::default()
+    }
+}
+
+/// A file whose header is read.
+struct Body<'a> {
+    input: &'a Input<'a>,
+    header: Header,
+    /// First byte that is not read.
+    at: usize,
+}
+
+impl<'a> Body<'a> {
+    /// Reads the header of a file.
+    fn open(input: &'a Input<'a>) -> Result<Self> {
+        let header = Header { has_normals: false, has_uvs: false, n_vertices: 0, n_faces: 0 };
+        let mut body = Self { input, header, at: 0 };
+        let (start, line) = body.next_line().unwrap_or_default();
+        let keyword = memchr::memmem::find(line, b"OFF").filter(|at| *at <= "STCN4n".len());
+        let Some(keyword) = keyword else {
+            let found = format!("`{}`", line[..line.len().min(40)].escape_ascii());
+            return Err(input.malformed(line_at(input, start), found, "`OFF`", ADVICE));
+        };
+        let (prefix, rest) = (&line[..keyword], line[keyword + 3..].trim_ascii());
+        if prefix.iter().any(|letter| matches!(letter, b'4' | b'n')) {
+            return Err(input.unsupported("OFF of other than three coordinates", ADVICE));
+        }
+        if rest.eq_ignore_ascii_case(b"BINARY") {
+            return Err(input.unsupported("binary OFF", ADVICE));
+        }
+        let counts =
+            if rest.is_empty() { body.next_line().unwrap_or_default() } else { (start, rest) };
+        let count = |word: &[u8]| str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+        let mut words = counts.1.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let [n_vertices, n_faces] = [words.next(), words.next()].map(|word| word.and_then(count));
+        let (Some(n_vertices), Some(n_faces)) = (n_vertices, n_faces) else {
+            let found = format!("`{}`", counts.1[..counts.1.len().min(40)].escape_ascii());
+            let expected = "the numbers of vertices, faces and edges";
+            return Err(input.malformed(line_at(input, counts.0), found, expected, ADVICE));
+        };
+        if u64::from(u32::MAX) < n_vertices {
+            let found = format!("{n_vertices} vertices");
+            return Err(input.unsupported(found, "cut the mesh into several files"));
+        }
+        let (has_normals, has_uvs) = (prefix.contains(&b'N'), prefix.starts_with(b"ST"));
+        body.header = Header { has_normals, has_uvs, n_vertices, n_faces };
+        Ok(body)
+    }
+
+    /// Returns the next line with its first byte, without comments and blanks around it; empty lines are skipped.
+    fn next_line(&mut self) -> Option<(usize, &'a [u8])> {
+        let input = self.input;
+        while self.at < input.len() {
+            let (start, rest) = (self.at, &input[self.at..]);
+            let length = find_line_end(rest).unwrap_or(rest.len());
+            self.at += length;
+            let text = rest[..length].split(|byte| *byte == b'#').next().unwrap_or_default();
+            if !text.trim_ascii().is_empty() {
+                return Some((start, text.trim_ascii()));
+            }
+        }
+        None
+    }
+
+    /// Reads the vertices with their normals and colours.
+    fn read_vertices(
+        &mut self,
+        options: &LoadOptions,
+        progress: &dyn Progress,
+    ) -> Result<PointCloud> {
+        let Header { has_normals, has_uvs, n_vertices, .. } = self.header;
+        let n_before_color = if has_normals { 6 } else { 3 };
+        let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        progress.begin(&format!("read {}", self.input.name), n_vertices);
+        self.for_each_line(n_vertices, progress, |numbers| {
+            let n_uvs = if has_uvs { 2 } else { 0 };
+            if numbers.len() < n_before_color + n_uvs {
+                let expected = format!("at least {}", n_before_color + n_uvs);
+                return Err(LineError { found: counted(numbers.len(), "number"), expected });
+            }
+            positions.push(DVec3::new(numbers[0], numbers[1], numbers[2]));
+            if has_normals {
+                normals.push(DVec3::new(numbers[3], numbers[4], numbers[5]).as_vec3());
+            }
+            if let [r, g, b, ..] = numbers[n_before_color..numbers.len() - n_uvs] {
+                colors.push([r, g, b]);
+            }
+            Ok(())
+        })?;
+        let (origin, positions) = relative_to_origin(&positions, Tolerance::UNSTATED, options);
+        let range = ColorRange::from_text(colors.as_flattened().iter().copied());
+        let is_complete = !colors.is_empty() && colors.len() == positions.len();
+        let to_16_bits = |color: &[f64; 3]| color.map(|v| (v * range.scale()).round() as u16);
+        Ok(PointCloud {
+            origin,
+            normals: has_normals.then_some(normals),
+            colors: is_complete.then(|| colors.iter().map(to_16_bits).collect()),
+            ..PointCloud::from_positions(positions)
+        })
+    }
+
+    /// Reads the faces as triangles; also returns the number of those that have fewer than three corners.
+    fn read_faces(&mut self, progress: &dyn Progress) -> Result<(Vec<[u32; 3]>, u64)> {
+        let Header { n_vertices, n_faces, .. } = self.header;
+        let (mut triangles, mut n_short) = (Vec::new(), 0);
+        progress.begin(&format!("read the faces of {}", self.input.name), n_faces);
+        let mut corners: Vec<u32> = Vec::new();
+        self.for_each_line(n_faces, progress, |numbers| {
+            let n_corners = numbers[0];
+            let is_whole = n_corners.fract() == 0.0 && 0.0 <= n_corners;
+            let Some(found) = numbers[1..].get(..n_corners as usize).filter(|_| is_whole) else {
+                let expected = "the number of corners and their vertices".into();
+                return Err(LineError { found: counted(numbers.len(), "number"), expected });
+            };
+            corners.clear();
+            for corner in found {
+                if corner.fract() != 0.0 || !(0.0..n_vertices as f64).contains(corner) {
+                    let expected = format!("0 to {}", n_vertices.saturating_sub(1));
+                    return Err(LineError { found: format!("vertex {corner}"), expected });
+                }
+                corners.push(*corner as u32);
+            }
+            n_short += u64::from(corners.len() < 3);
+            let others = corners.windows(2).skip(1);
+            triangles.extend(others.map(|pair| [corners[0], pair[0], pair[1]]));
+            Ok(())
+        })?;
+        Ok((triangles, n_short))
+    }
+
+    /// Parses so many lines of numbers, at least one each.
+    fn for_each_line(
+        &mut self,
+        n_lines: u64,
+        progress: &dyn Progress,
+        mut visit: impl FnMut(&[f64]) -> std::result::Result<(), LineError>,
+    ) -> Result<()> {
+        let input = self.input;
+        let mut numbers = Vec::new();
+        for i in 0..n_lines {
+            if i % LINES_PER_CHECK == 0 {
+                progress.check()?;
+                progress.advance(LINES_PER_CHECK.min(n_lines - i));
+            }
+            let (start, line) = self
+                .next_line()
+                .ok_or_else(|| input.truncated(Location::Byte(input.len() as u64), i, n_lines))?;
+            numbers.clear();
+            let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+            let fault = |error| -> Error { ParseFault::new(start, error).into_error(input) };
+            for word in words {
+                numbers.push(parse_number(word).map_err(fault)?);
+            }
+            visit(&numbers).map_err(fault)?;
+        }
+        Ok(())
+    }
+}
