@@ -20,7 +20,7 @@ impl Separator {
     pub fn detect(line: &[u8]) -> Self {
         let has_spaces = |field: &[u8]| {
             let mut words = Self::Whitespace.fields(field);
-            field.contains(&b' ') && !words.all(|word| parse_number(word).is_ok())
+            field.contains(&b' ') && !words.all(|word| Self::Whitespace.parse_number(word).is_ok())
         };
         if line.contains(&b';') {
             Self::Semicolon
