@@ -10,7 +10,7 @@ use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
     CloudBuilder, ColumnField, ColumnRole, Field, NumberType, ParseFault, RecordLayout, TextChunk,
-    find_line_end, parse_chunks, parse_number,
+    find_line_end, parse_chunks, parse_number, words_of,
 };
 
 /// Number of chunks of text whose cells are in memory at a time.
@@ -123,7 +123,7 @@ fn read_header(input: &Input) -> Result<Header> {
     let mut data = 0;
     let lines = input.split_inclusive(|byte| *byte == b'\n').take(MAX_HEADER_LINES);
     for (i, line) in lines.enumerate() {
-        let mut words = line.trim_ascii().split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        let mut words = words_of(line.trim_ascii());
         let key = words.next().unwrap_or_default();
         if !key.is_empty() && parse_number(key).is_ok() {
             break;
@@ -197,7 +197,7 @@ impl Header {
 fn parse_cells(chunk: TextChunk) -> std::result::Result<Vec<f64>, ParseFault> {
     let mut cells = Vec::new();
     for (byte, line) in chunk.lines(find_line_end) {
-        for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+        for word in words_of(line) {
             cells.push(parse_number(word).map_err(|error| ParseFault::new(byte, error))?);
         }
     }

@@ -13,7 +13,7 @@ use crate::mesh::{Model, linear_colors, relative_to_origin, repair_model};
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::table::{
     ColorRange, LineError, ParseFault, Tolerance, find_line_end, keep_matching, line_at,
-    parse_number,
+    parse_number, words_of,
 };
 
 /// Number of lines between two looks for cancellation.
@@ -109,7 +109,7 @@ impl<'a> Body<'a> {
         let counts =
             if rest.is_empty() { body.next_line().unwrap_or_default() } else { (start, rest) };
         let count = |word: &[u8]| str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-        let mut words = counts.1.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut words = words_of(counts.1);
         let [n_vertices, n_faces] = [words.next(), words.next()].map(|word| word.and_then(count));
         let (Some(n_vertices), Some(n_faces)) = (n_vertices, n_faces) else {
             let found = format!("`{}`", counts.1[..counts.1.len().min(40)].escape_ascii());
@@ -224,7 +224,7 @@ impl<'a> Body<'a> {
                 .next_line()
                 .ok_or_else(|| input.truncated(Location::Byte(input.len() as u64), i, n_lines))?;
             numbers.clear();
-            let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+            let words = words_of(line);
             let fault = |error| -> Error { ParseFault::new(start, error).into_error(input) };
             for word in words {
                 numbers.push(parse_number(word).map_err(fault)?);

@@ -16,7 +16,7 @@ use crate::salvage::Salvage;
 use crate::stations::set_stations;
 use crate::table::{
     ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance,
-    named_columns, origin_of_records, parse_number, read_records, read_rows,
+    named_columns, origin_of_records, parse_number, read_records, read_rows, words_of,
 };
 
 /// Channels of a packed colour and their bytes in it.
@@ -247,7 +247,7 @@ fn parse_point(
     header: &Header,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
-    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut words = words_of(line);
     let mut n_found = 0;
     for field in &header.fields {
         for _ in 0..field.count {

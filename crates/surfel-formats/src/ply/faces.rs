@@ -11,7 +11,7 @@ use crate::file::Input;
 use crate::salvage::Salvage;
 use crate::table::{
     Field, LineError, NumberType, ParseFault, TextChunk, find_line_end, line_at, parse_chunks,
-    parse_number,
+    parse_number, words_of,
 };
 
 /// The faces of a file.
@@ -203,7 +203,7 @@ impl<'a> FaceElement<'a> {
 
     /// Parses the lists in a line.
     fn parse_line(&self, line: &[u8], lists: &mut Lists) -> std::result::Result<(), LineError> {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut words = words_of(line);
         let mut number = || {
             let word = words.next().ok_or_else(|| LineError {
                 found: "the end of the line".into(),

@@ -18,7 +18,7 @@ use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
     ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance, named_columns,
-    origin_of_records, parse_number, read_records, read_rows,
+    origin_of_records, parse_number, read_records, read_rows, words_of,
 };
 
 /// Reads the header.
@@ -218,7 +218,7 @@ fn parse_vertex(
     vertex: &Element,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
-    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut words = words_of(line);
     let mut number = |n_found: usize| {
         let word = words.next().ok_or_else(|| LineError {
             found: counted(n_found, "value"),

@@ -13,7 +13,7 @@ use crate::salvage::Salvage;
 use crate::stations::set_stations;
 use crate::table::{
     CloudBuilder, ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout,
-    RowRange, append_rows, parse_number,
+    RowRange, append_rows, parse_number, words_of,
 };
 
 /// Names of the last columns: the place of each point in the grid of its scan.
@@ -160,7 +160,7 @@ fn parse_cell(
     n_columns: usize,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
-    for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+    for word in words_of(line) {
         row.push(parse_number(word)?);
     }
     if row.len() != scan.n_fields {

@@ -7,7 +7,7 @@ use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
 use crate::stations::MAX_STATIONS;
-use crate::table::{MAX_LINE_LENGTH, parse_number};
+use crate::table::{MAX_LINE_LENGTH, parse_number, words_of};
 
 /// Number of lines before the points of a scan: columns, rows, scanner position, its three axes, and the four rows of
 /// the transform.
@@ -200,7 +200,7 @@ impl<'a> Lines<'a> {
     /// Returns the numbers of the next line.
     fn numbers<const N: usize>(&mut self, expected: &str) -> Result<[f64; N]> {
         let line = self.next()?;
-        let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let words = words_of(line);
         let mut numbers = [0.0; N];
         let mut n_found = 0;
         for word in words {

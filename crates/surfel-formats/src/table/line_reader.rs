@@ -185,6 +185,11 @@ pub(crate) fn append_rows(
     Ok(())
 }
 
+/// Returns the words of a line between blanks.
+pub(crate) fn words_of(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
 /// Words that programs write for a missing number, in upper case; that of the C library of Windows is `-nan(ind)`.
 const MISSING: [&[u8]; 7] =
     [b"NA", b"N/A", b"NULL", b"NONE", b"-NAN(IND)", b"NAN(IND)", b"-NAN(SNAN)"];

@@ -13,6 +13,12 @@ fn record(name: RecordName, data_type: RecordDataType) -> Record {
     Record { name, data_type }
 }
 
+/// Returns the fields of a point: its coordinates and further ones.
+fn prototype<const N: usize>(further: [Record; N]) -> Vec<Record> {
+    let axes = [Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+    axes.into_iter().chain(further).collect()
+}
+
 #[test]
 fn scans_are_moved_to_world_coordinates() {
     let loaded = read("a.e57", small_file()).unwrap();
@@ -45,15 +51,10 @@ fn a_field_named_station_is_not_taken_for_the_stations_of_points() {
     let scan = |name| Scan {
         name,
         pose: None,
-        prototype: vec![
-            Record::CARTESIAN_X_F64,
-            Record::CARTESIAN_Y_F64,
-            Record::CARTESIAN_Z_F64,
-            record(
-                RecordName::Unknown { namespace: "nor".into(), name: "station".into() },
-                RecordDataType::Integer { min: 0, max: 1000 },
-            ),
-        ],
+        prototype: prototype([record(
+            RecordName::Unknown { namespace: "nor".into(), name: "station".into() },
+            RecordDataType::Integer { min: 0, max: 1000 },
+        )]),
         points: vec![[vec![RecordValue::Double(1.0); 3], vec![RecordValue::Integer(7)]].concat()],
     };
     let cloud = read("a.e57", write(&[scan("hall"), scan("yard")])).unwrap().cloud;
@@ -74,13 +75,7 @@ fn an_extension_stands_beside_the_standard_field_of_its_meaning() {
     let scan = Scan {
         name: "hall",
         pose: None,
-        prototype: vec![
-            Record::CARTESIAN_X_F64,
-            Record::CARTESIAN_Y_F64,
-            Record::CARTESIAN_Z_F64,
-            field(reflectance),
-            field(RecordName::Intensity),
-        ],
+        prototype: prototype([field(reflectance), field(RecordName::Intensity)]),
         points: vec![[vec![RecordValue::Double(1.0); 3], values.to_vec()].concat()],
     };
     let cloud = read("a.e57", write(&[scan])).unwrap().cloud;
@@ -93,7 +88,7 @@ fn scans_that_share_their_points_are_refused() {
     let scan = |name| Scan {
         name,
         pose: None,
-        prototype: vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64],
+        prototype: prototype([]),
         points: vec![vec![RecordValue::Double(1.0); 3]],
     };
     let bytes = write(&[scan("a"), scan("b"), scan("c")]);
@@ -130,12 +125,7 @@ fn integers_of_any_number_of_bits_are_decoded() {
         let scan = Scan {
             name: "a",
             pose: None,
-            prototype: vec![
-                Record::CARTESIAN_X_F64,
-                Record::CARTESIAN_Y_F64,
-                Record::CARTESIAN_Z_F64,
-                record(name, RecordDataType::Integer { min, max }),
-            ],
+            prototype: prototype([record(name, RecordDataType::Integer { min, max })]),
             points: (0..n_points)
                 .map(|i| {
                     let mut point = vec![RecordValue::Double(i as f64); 3];
@@ -208,13 +198,10 @@ fn the_rays_of_a_grid_tell_the_station_of_a_scan_without_a_pose() {
         write(&[Scan {
             name: "hall",
             pose: None,
-            prototype: vec![
-                Record::CARTESIAN_X_F64,
-                Record::CARTESIAN_Y_F64,
-                Record::CARTESIAN_Z_F64,
+            prototype: prototype([
                 record(RecordName::RowIndex, index.clone()),
                 record(RecordName::ColumnIndex, index),
-            ],
+            ]),
             points: (0..1600).map(point).collect(),
         }])
     };
@@ -368,17 +355,14 @@ fn invalid_colours_are_black_and_invalid_intensities_no_numbers() {
     let scan = Scan {
         name: "hall",
         pose: None,
-        prototype: vec![
-            Record::CARTESIAN_X_F64,
-            Record::CARTESIAN_Y_F64,
-            Record::CARTESIAN_Z_F64,
+        prototype: prototype([
             Record::COLOR_RED_U8,
             Record::COLOR_GREEN_U8,
             Record::COLOR_BLUE_U8,
             record(RecordName::IsColorInvalid, flag.clone()),
             record(RecordName::Intensity, unit),
             record(RecordName::IsIntensityInvalid, flag),
-        ],
+        ]),
         points: vec![point(200, 0, 0.5, 1), point(200, 1, 0.25, 0)],
     };
     let cloud = read("a.e57", write(&[scan])).unwrap().cloud;
