@@ -31,7 +31,7 @@ use surfel_core::surface::mls;
 use surfel_core::surface::smooth;
 use surfel_core::surface::{
     Align, FIELD_SUPPORT, FIT_REACH, MAX_GATHERED, MIN_DISC_WEIGHT, MIN_FIELD_WEIGHT,
-    NEIGHBORHOOD_RADIUS_FACTOR, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR, SurfaceKind,
+    NEIGHBORHOOD_RADIUS_FACTOR, SOLID_ROUNDING, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR, SurfaceKind,
 };
 use surfel_core::trace::constants as trace;
 
@@ -185,6 +185,7 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("MIN_SPREAD", eigen::MIN_SPREAD),
         ("NORMAL_STEPS", eigen::NORMAL_STEPS),
         ("MIN_CROSS", eigen::MIN_CROSS),
+        ("SOLID_ROUNDING", SOLID_ROUNDING),
         ("SOLID_SPAWN_OFFSET", SOLID_SPAWN_OFFSET),
         ("DISC_SPAWN_OFFSET", disc::SPAWN_OFFSET),
         ("DISC_SPAWN_T_MIN", disc::SPAWN_T_MIN),

@@ -21,7 +21,7 @@ pub struct WorldRays {
 
 impl WorldRays {
     /// Rays `[x, y, z, dx, dy, dz]`: origin and direction in world coordinates. The direction has any length; one of length
-    /// 0, and a ray with a number that is not finite, hits nothing. `t_range` is the part of each ray that counts, in
+    /// 0 as f32, and a ray with a number that is not finite as f32, hits nothing. `t_range` is the part of each ray that counts, in
     /// multiples of the length of its direction.
     pub fn new(
         rays: impl IndexedParallelIterator<Item = [f64; 6]>,
@@ -32,7 +32,8 @@ impl WorldRays {
             let origin = (DVec3::new(x, y, z) - scene.origin).as_vec3();
             let direction = DVec3::new(dx, dy, dz);
             let length = direction.length() as f32;
-            let Some(direction) = direction.try_normalize().filter(|_| origin.is_finite()) else {
+            let is_valid = origin.is_finite() && 0.0 < length && length.is_finite();
+            let Some(direction) = direction.try_normalize().filter(|_| is_valid) else {
                 return (Ray { t_max: -1.0, ..Ray::new(Vec3::ZERO, Vec3::Z) }, length);
             };
             let (t_min, t_max) = (t_range.0 * length, t_range.1 * length);
@@ -251,6 +252,10 @@ mod tests {
         assert_eq!(caster.occlusions(&all, &NoProgress).unwrap(), occluded);
         let short = WorldRays::new(rays.par_iter().copied(), (0.0, 6.0), &scene);
         assert_eq!(caster.occlusions(&short, &NoProgress).unwrap()[..2], [false, true]);
+        // Neither length is one of f32.
+        let lengths = [1e-60, 1e60].map(|length| down(0.5, length));
+        let odd = WorldRays::new(lengths.par_iter().copied(), (0.0, f32::INFINITY), &scene);
+        assert_eq!(caster.hits(&odd, &NoProgress).unwrap().t_hit, [none, none]);
         let late = WorldRays::new(rays.par_iter().copied(), (8.0, 20.0), &scene);
         assert_eq!(caster.hits(&late, &NoProgress).unwrap().t_hit[0], 10.0);
     }

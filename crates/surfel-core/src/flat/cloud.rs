@@ -160,6 +160,7 @@ impl FlatCloud {
         };
         self.set_max_blend_distance();
         if !needs_rebuild {
+            self.edge_retest_factor = edge_retest_factor(self.points.evenness());
             self.build_field(geometry, progress)?;
         }
         needs_rebuild.then(|| Self::from_columns(columns, geometry, progress)).transpose()

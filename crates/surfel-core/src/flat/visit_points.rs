@@ -85,7 +85,7 @@ pub fn visit_points_in_turn<T: Send>(
         let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
         let points = [&cloud.points, &cloud.lines, &cloud.scatter].map(|points| points as _);
         let trees: [&dyn Slots; 4] = [points[0], points[1], points[2], &*cloud.gaussians];
-        for tree in trees {
+        for (tree_idx, tree) in trees.into_iter().enumerate() {
             let ids = tree.ids();
             let point_at = |slot: usize| {
                 if ids[slot] == NO_PRIMITIVE {
@@ -94,7 +94,7 @@ pub fn visit_points_in_turn<T: Send>(
                 let (center, color) = tree.center_and_color(slot as Slot);
                 let position = scene.origin + instance.world_position(center).as_dvec3();
                 let is_hidden = scene.camera_planes.iter().any(|plane| plane.hides(position));
-                let key = (instance_idx as u64) << 40 | slot as u64;
+                let key = ((trees.len() * instance_idx + tree_idx) as u64) << 40 | slot as u64;
                 (!is_hidden).then_some(VisitedPoint { position, color, key })
             };
             let visit_part = |part: usize| {

@@ -137,7 +137,13 @@ impl Shading {
         let is_outward = 0.0 <= self.geometric_normal.dot(direction);
         let side = if is_outward { self.geometric_normal } else { -self.geometric_normal };
         match self.surface {
-            Some(surface) => surface.spawn_ray(self.position, side, self.spawn_radius, direction),
+            Some(surface) => surface.spawn_ray(
+                self.position,
+                self.coordinate_magnitude,
+                side,
+                self.spawn_radius,
+                direction,
+            ),
             None => {
                 // The position is wrong by a few roundings of the coordinates that it was computed from.
                 let origin = self.position + 32.0 * f32::EPSILON * self.coordinate_magnitude * side;

@@ -10,6 +10,9 @@ use crate::math::{Aabb, Ray, Vec3};
 
 /// The height of the origin of secondary rays above spheres and capsules, in radii.
 pub const SOLID_SPAWN_OFFSET: f32 = 1e-3;
+/// Rounding of a hit on a solid shape, relative to the largest coordinate on the way there: a far sphere is hit with the
+/// error of the distance.
+pub const SOLID_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// The shape given to the points of a cloud (Wiesmeier, Ray Tracing Point Clouds, 2011).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -146,14 +149,22 @@ impl SurfaceKind {
     ///
     /// Discs overlap within about a radius of each other, so the ray skips their own neighbourhood
     /// (Schaufler and Jensen 2000). Spheres are solid and need an offset for the rounding of f32 only.
-    pub fn spawn_ray(self, position: Vec3, normal: Vec3, radius: f32, direction: Vec3) -> Ray {
-        let rounding = 4.0 * f32::EPSILON * position.abs().max_element();
+    /// `magnitude` is the largest coordinate of the position and of the origin of the ray that found it.
+    pub fn spawn_ray(
+        self,
+        position: Vec3,
+        magnitude: f32,
+        normal: Vec3,
+        radius: f32,
+        direction: Vec3,
+    ) -> Ray {
         let t_min = if self.is_continuous() { self.spawn_distance() * radius } else { 0.0 };
-        let offset = match self {
-            Self::Smooth | Self::Implicit => smooth::SPAWN_OFFSET,
-            Self::Mls => mls::SPAWN_OFFSET,
-            _ if self.uses_discs() => disc::SPAWN_OFFSET,
-            _ => SOLID_SPAWN_OFFSET,
+        let of_position = 4.0 * f32::EPSILON * position.abs().max_element();
+        let (offset, rounding) = match self {
+            Self::Smooth | Self::Implicit => (smooth::SPAWN_OFFSET, of_position),
+            Self::Mls => (mls::SPAWN_OFFSET, of_position),
+            _ if self.uses_discs() => (disc::SPAWN_OFFSET, of_position),
+            _ => (SOLID_SPAWN_OFFSET, SOLID_ROUNDING * magnitude),
         };
         let offset = offset * radius;
         let origin = position + (offset + rounding) * normal;
@@ -171,5 +182,49 @@ impl std::str::FromStr for SurfaceKind {
             found: text.to_owned(),
             known: Self::ALL.map(|(name, _)| name).join(", "),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Rays that begin on shapes.
+
+    use super::*;
+    use crate::math::{Random, Vec3Lanes};
+    use crate::surface::shape::{PointLanes, RayLanes, Shape};
+    use crate::surface::sphere::Sphere;
+
+    fn hit_of_sphere(center: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
+        let (center, normal) =
+            (Vec3Lanes::splat(center - ray.origin), Vec3Lanes::splat(Vec3::ZERO));
+        let points = PointLanes { center, normal, radius };
+        let (distance, is_hit) = Sphere::intersect::<f32>(&points, &RayLanes::new(ray));
+        is_hit.then_some(distance)
+    }
+
+    #[test]
+    fn small_spheres_seen_from_afar_do_not_shade_themselves() {
+        let mut random = Random::new(12, 0);
+        for (radius, distance) in [(0.05, 2000.0), (0.02, 500.0), (0.3, 5000.0), (0.05, 5.0)] {
+            let mut vector =
+                || Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
+            let mut n_hits = 0;
+            for _ in 0..2000 {
+                let (center, from) = (vector(), vector().normalize());
+                let origin = center + distance * from;
+                let target = center + 0.9 * radius * vector();
+                let ray = Ray::new(origin, (target - origin).normalize());
+                let Some(distance) = hit_of_sphere(center, radius, &ray) else { continue };
+                n_hits += 1;
+                let position = ray.at(distance);
+                let normal = (position - center).normalize();
+                let sun = (normal + 0.7 * vector().normalize()).normalize();
+                let magnitude = position.abs().max(origin.abs()).max_element();
+                let to_sun =
+                    SurfaceKind::Sphere.spawn_ray(position, magnitude, normal, radius, sun);
+                assert_eq!(hit_of_sphere(center, radius, &to_sun), None, "{radius} {distance}");
+            }
+            assert!(1000 < n_hits, "{n_hits}");
+        }
     }
 }

@@ -26,7 +26,7 @@ pub use edge_test::{
 };
 pub use field::{FIELD_SUPPORT, FieldPoint, FieldSums, MIN_FIELD_WEIGHT};
 pub use gaussian::{GaussianLanes, WhitenedGaussian};
-pub use kind::{SOLID_SPAWN_OFFSET, SurfaceKind};
+pub use kind::{SOLID_ROUNDING, SOLID_SPAWN_OFFSET, SurfaceKind};
 pub use octree_depth::OctreeDepth;
 pub use options::{GatherLimit, SurfaceOptions};
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};

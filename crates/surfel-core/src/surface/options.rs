@@ -72,8 +72,28 @@ impl SurfaceOptions {
         }
         match kind {
             SurfaceKind::Cylinder => self.radius_factor(kind).max(1.0),
-            SurfaceKind::Mls => (self.radius_factor(kind) / kind.radius_factor()).max(1.0),
+            SurfaceKind::Mls | SurfaceKind::SplatFit => {
+                (self.radius_factor(kind) / kind.radius_factor()).max(1.0)
+            }
             _ => 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Factors that follow from options.
+
+    use super::*;
+
+    #[test]
+    fn a_longer_reach_lets_new_rays_skip_more() {
+        let options = SurfaceOptions { reach: Some(8.0), ..SurfaceOptions::default() };
+        for kind in [SurfaceKind::SplatFit, SurfaceKind::Mls] {
+            let expected = options.radius_factor(kind) / kind.radius_factor();
+            assert!(1.0 < expected);
+            assert_eq!(options.spawn_factor(kind), expected, "{kind:?}");
+            assert_eq!(SurfaceOptions::default().spawn_factor(kind), 1.0);
         }
     }
 }

@@ -168,6 +168,8 @@ fn approach<L: Lanes, const N: usize>(
             let planes = fit_planes(lists, shift, direction);
             if fit == 1 {
                 let clearance = splat(RESTART_FRACTION) * planes.height.abs().min(splat(MAX_STEP));
+                // Points that span no plane tell no height.
+                let clearance = L::PacketLanes::select(planes.is_plane, clearance, splat(0.0));
                 let ahead = clearance.max(splat(RESTART_OFFSET)) * radius;
                 hits.restarts = hits.restarts + ahead;
             }

@@ -66,7 +66,6 @@ pub fn mls_hits<L: Lanes, const HAS_COLORS: bool>(
                     };
                     continue;
                 }
-                // NaN where the points around span no plane.
                 let least = distances[lane] * (1.0 + 2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
                 searching.restart(first + lane, restarts[lane].max(least));
             }

@@ -140,11 +140,15 @@ fn is_solid_dielectric(shading: Shading) -> bool {
 
 fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
     let position = (*shading).position;
+    // The position is wrong by a few roundings of the coordinates that it was computed from.
+    let magnitude = max(largest(abs(position)), largest(abs(ray.origin)));
     if hit.surface == TRIANGLE {
-        // The position is wrong by a few roundings of the coordinates that it was computed from.
-        let coordinates = max(largest(abs(position)), largest(abs(ray.origin)));
-        (*shading).spawn_offset = 32.0 * EPSILON * coordinates;
+        (*shading).spawn_offset = 32.0 * EPSILON * magnitude;
         return;
+    }
+    var rounding = 4.0 * EPSILON * largest(abs(position));
+    if hit.surface == SPHERE || hit.surface == CAPSULE {
+        rounding = SOLID_ROUNDING * magnitude;
     }
     var offset = SOLID_SPAWN_OFFSET;
     var t_min = 0.0;
@@ -163,7 +167,7 @@ fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
         offset = DISC_SPAWN_OFFSET;
         t_min = DISC_SPAWN_T_MIN;
     }
-    (*shading).spawn_offset = offset * radius + 4.0 * EPSILON * largest(abs(position));
+    (*shading).spawn_offset = offset * radius + rounding;
     (*shading).spawn_t_min = t_min * radius;
 }
 
