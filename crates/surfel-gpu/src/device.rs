@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::numbers::{
     MAX_QUEUE_ENTRIES, N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES, WORKGROUP_SIZE,
 };
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -255,12 +256,26 @@ impl Gpu {
             _ => WAIT_TIMEOUT,
         };
         let wait = wgpu::PollType::Wait { submission_index, timeout: Some(timeout) };
-        let polled = self.device.poll(wait);
+        self.finish_wait(timeout, || self.device.poll(wait))
+    }
+
+    /// Runs `poll`, which waits this long at most.
+    fn finish_wait(
+        &self,
+        timeout: Duration,
+        poll: impl FnOnce() -> std::result::Result<wgpu::PollStatus, wgpu::PollError>,
+    ) -> Result<()> {
+        // wgpu panics if a device is lost while it waits, or has no memory then. Its callback has kept the reason before.
+        let polled = catch_unwind(AssertUnwindSafe(poll));
         self.check()?;
-        polled.map(drop).map_err(|_| {
-            let secs = timeout.as_secs();
-            self.keep_failure(format!("did not finish within {secs} seconds"))
-        })
+        match polled {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(_)) => {
+                let secs = timeout.as_secs();
+                Err(self.keep_failure(format!("did not finish within {secs} seconds")))
+            }
+            Err(_) => Err(self.keep_failure("was lost".to_owned())),
+        }
     }
 
     /// Runs `work` and returns its result, or the error that it caused.
@@ -420,6 +435,19 @@ mod tests {
         assert!(error.to_string().starts_with(&expected), "{error}");
         // The device is still good for other work.
         assert_eq!((gpu.check(), gpu.wait()), (Ok(()), Ok(())));
+    }
+
+    #[test]
+    fn a_panic_of_a_wait_is_the_loss_of_the_device() {
+        let wait = |gpu: &Gpu| gpu.finish_wait(WAIT_TIMEOUT, || panic!("Error in Device::poll"));
+        let Some(gpu) = open_gpu() else { return };
+        let error = wait(&gpu).unwrap_err();
+        assert_eq!(error.to_string(), format!("{}: was lost", gpu.info.name));
+        // Its callback knows more.
+        let Some(gpu) = open_gpu() else { return };
+        let known = gpu.keep_failure("was lost: no power".to_owned());
+        assert_eq!(wait(&gpu), Err(known.clone()));
+        assert_eq!(gpu.check(), Err(known));
     }
 
     #[test]
