@@ -250,3 +250,43 @@ pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()
     let reason = format!("the GPU has no benchmark of {}", surface_name(cloud));
     Err(Error::Device { device: gpu.info.name.clone(), reason })
 }
+
+#[cfg(test)]
+mod tests {
+    //! Searches find the same whatever the range of a ray.
+
+    use super::*;
+    use crate::test_support::{open_renderer, scene_of_points};
+    use surfel_core::math::Vec3;
+    use surfel_core::progress::NoProgress;
+    use surfel_core::surface::SurfaceKind;
+
+    #[test]
+    fn ranges_that_begin_or_end_in_a_cell_do_not_move_what_is_hit() {
+        let Some(renderer) = open_renderer() else { return };
+        let ray = |i: u16| {
+            let target = Vec3::new(f32::from(i % 40), f32::from(i / 40), 0.0) * 0.45;
+            let origin = target + Vec3::new(1.0, -0.5, 10.0);
+            Ray::new(origin, (target - origin).normalize())
+        };
+        let rays: Vec<Ray> = (0..800).map(ray).collect();
+        for kind in [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat] {
+            let geometry = &scene_of_points(kind).geometries[0];
+            let distances = |rays: &[Ray]| {
+                let timing = Timing { geometry, rays, query: TimedQuery::Surface, n_runs: 1 };
+                renderer.time_rays(timing, &NoProgress).unwrap().distances
+            };
+            let pairs = rays.iter().copied().zip(distances(&rays));
+            let (rays, whole): (Vec<_>, Vec<_>) =
+                pairs.filter(|(_, distance)| distance.is_finite()).unzip();
+            assert!(400 < rays.len(), "{} {}", kind.name(), rays.len());
+            // A leaf finds zeros up to a hundredth of a support beyond its end.
+            let around = |(ray, distance): (&Ray, &f32)| {
+                let (t_min, t_max) = (distance - 0.1, distance + 0.1);
+                Ray { t_min, t_max, ..*ray }
+            };
+            let narrow: Vec<Ray> = rays.iter().zip(&whole).map(around).collect();
+            assert!(distances(&narrow) == whole, "{}", kind.name());
+        }
+    }
+}

@@ -1,6 +1,6 @@
 // The way of a ray through an octree: nodes and cells, about front to back.
 
-// A cell with the interval of the ray in it.
+// A cell with the interval of the ray's line in it.
 struct CellInterval {
     cell_idx: u32,
     enter: f32,
@@ -69,8 +69,8 @@ fn child_cube(cube: CellCube, child: u32) -> CellCube {
     return CellCube(cube.low + size * upper, size);
 }
 
-// Returns the next cell that the ray passes through before a limit and that is fine enough; its index is NONE if there
-// is none. `at_origin` and `per_distance` give the size of a pixel.
+// Returns the next cell that the ray passes through, or closely beside, in its range before a limit and that is fine
+// enough; its index is NONE if there is none. `at_origin` and `per_distance` give the size of a pixel.
 fn next_cell(limit: f32, at_origin: f32, per_distance: f32) -> CellInterval {
     while take_node() {
         let cube = next_cube;
@@ -78,13 +78,16 @@ fn next_cell(limit: f32, at_origin: f32, per_distance: f32) -> CellInterval {
         let high = (cube.low - walk_ray.origin + cube.size) * walk_inverse;
         let near = min(low, high);
         let far = max(low, high);
-        let enter = max(max(near.x, near.y), max(near.z, walk_ray.t_min));
-        let leave = min(min(far.x, far.y), min(far.z, walk_ray.t_max));
-        if leave < enter || limit < enter - MAX_CELL_MARGIN * cube.size {
+        // Intervals do not depend on the range, nor does the place where a surface is found in them.
+        let enter = max(max(near.x, near.y), near.z);
+        let leave = min(min(far.x, far.y), far.z);
+        let margin = MAX_CELL_MARGIN * cube.size;
+        if leave < enter || leave + margin < walk_ray.t_min || limit < enter - margin {
             continue;
         }
         let node = octree_node(next_node);
-        let is_fine = node.is_finest || cube.size <= at_origin + per_distance * enter;
+        let size = at_origin + per_distance * max(enter, walk_ray.t_min);
+        let is_fine = node.is_finest || cube.size <= size;
         if node.cell != 0u && is_fine {
             return CellInterval(node.cell - 1u, enter, leave, cube);
         }
