@@ -8,6 +8,7 @@ use surfel_core::image::Aovs;
 use surfel_core::integrator::albedo;
 use surfel_core::math::Vec3;
 use surfel_core::scene::View;
+use surfel_core::scene::color::SupportColors;
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::SceneHit;
 
@@ -59,6 +60,10 @@ fn point_id(scene: &FlatScene, hit: &HitRecord) -> u32 {
 /// Returns the part of a hit that its albedo depends on.
 fn scene_hit(scene: &FlatScene, hit: &HitRecord) -> SceneHit {
     let [second, third] = hit.barycentrics;
+    let color = match support_colors(scene, hit) {
+        Some(colors) => colors.color(hit.support_distance),
+        None => Vec3::from_array(hit.color),
+    };
     SceneHit {
         distance: hit.distance,
         instance: hit.instance,
@@ -69,9 +74,19 @@ fn scene_hit(scene: &FlatScene, hit: &HitRecord) -> SceneHit {
         spawn_radius: hit.radius,
         normal: Vec3::from_array(hit.normal),
         geometric_normal: Vec3::from_array(hit.geometric_normal),
-        color: Vec3::from_array(hit.color),
+        color,
         alpha: hit.alpha,
         surface: SURFACES.get(hit.surface as usize).copied(),
         is_backface: hit.is_backface == 1,
+    }
+}
+
+/// Returns the colours by support of the cloud that was hit, if it has them. Trained Gaussians keep their own.
+fn support_colors<'s>(scene: &'s FlatScene, hit: &HitRecord) -> Option<&'s SupportColors> {
+    match scene.geometry(&scene.instances[hit.instance as usize]) {
+        FlatGeometry::Cloud(cloud) if cloud.surface != SurfaceKind::Gaussian => {
+            cloud.support_colors.as_ref()
+        }
+        _ => None,
     }
 }
