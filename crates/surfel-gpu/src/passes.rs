@@ -262,7 +262,9 @@ impl Passes {
         let is_sampled = 1 < settings.samples_per_pixel;
         let has_gaussians = !gaussians.is_empty();
         if is_sampled || self.next_wave.is_some() || has_gaussians {
-            let kind = if is_sampled { ray_kind::PRIMARY } else { ray_kind::UNCOUNTED };
+            // Wavefronts overwrite the hits of their one sample, whose rays are counted.
+            let is_counted = is_sampled || has_gaussians;
+            let kind = if is_counted { ray_kind::PRIMARY } else { ray_kind::UNCOUNTED };
             self.aov_hits = self.camera_passes(kind);
             let trace = self.trace_passes(trees);
             self.aov_hits.extend(trace);
