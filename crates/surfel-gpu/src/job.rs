@@ -123,8 +123,7 @@ impl Job<'_> {
         let Self { gpu, settings, region, sizes, .. } = *self;
         let start = Instant::now();
         let view = self.scene.camera.view(self.scene.origin, settings.width, settings.height);
-        let (first_row, n_rows) = (region.rows.0, region.n_rows());
-        let order = PixelOrder { width: settings.width, first_row, n_rows };
+        let order = PixelOrder::new(&region);
         progress.begin("render", order.n_pixels().into());
         let Self { records, words, .. } = self;
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
@@ -148,7 +147,16 @@ impl Job<'_> {
         };
         let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
         let frame = frame(self.scene, &view, settings);
-        let frame = FrameRecord { capacity, n_samples, first_row, n_rows, ..frame };
+        let PixelOrder { first_row, n_rows, first_column, n_columns } = order;
+        let frame = FrameRecord {
+            capacity,
+            n_samples,
+            first_row,
+            n_rows,
+            first_column,
+            n_columns,
+            ..frame
+        };
         self.render_parts(&mut submitter, frame, &mut picture)?;
         let Picture { image, mut stats, .. } = picture;
         stats.trace_secs = submitter.primary_secs;

@@ -3,41 +3,55 @@
 use crate::numbers::BAND_HEIGHT;
 use crate::threads::for_each;
 use surfel_core::image::Image;
+use surfel_core::render::RenderRegion;
 
 /// Minimum number of pixels of a piece: for one, a thread is worth its start, which takes some ten microseconds.
 const PIXELS_OF_PIECE: usize = 1 << 16;
 
-/// The rows of a picture that are rendered. Their pixels are numbered in bands of `BAND_HEIGHT` rows, column by column, as
-/// `shader/render/key.wgsl` does.
+/// The rows and columns of a picture that are rendered. Their pixels are numbered in bands of `BAND_HEIGHT` rows, column by
+/// column, as `shader/render/key.wgsl` does.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelOrder {
-    /// Width of the picture.
-    pub width: u32,
     /// The first row.
     pub first_row: u32,
     /// Number of rows.
     pub n_rows: u32,
+    /// The first column.
+    pub first_column: u32,
+    /// Number of columns.
+    pub n_columns: u32,
 }
 
 impl PixelOrder {
+    /// Returns the order of the pixels of a region.
+    pub fn new(region: &RenderRegion) -> Self {
+        Self {
+            first_row: region.rows.0,
+            n_rows: region.n_rows(),
+            first_column: region.columns.0,
+            n_columns: region.n_columns(),
+        }
+    }
+
     /// Returns the number of pixels. Pictures have at most 2^28.
     pub fn n_pixels(&self) -> u32 {
-        self.width * self.n_rows
+        self.n_columns * self.n_rows
     }
 
     /// Returns the column and row in the picture of the pixel with this number.
     pub fn pixel_of(&self, pixel: u32) -> (u32, u32) {
-        let band = pixel / (BAND_HEIGHT * self.width);
+        let band = pixel / (BAND_HEIGHT * self.n_columns);
         let row = BAND_HEIGHT * band;
-        let in_band = pixel - row * self.width;
+        let in_band = pixel - row * self.n_columns;
         let height = BAND_HEIGHT.min(self.n_rows - row);
-        (in_band / height, self.first_row + row + in_band % height)
+        (self.first_column + in_band / height, self.first_row + row + in_band % height)
     }
 
-    /// Returns the index in the image of these rows of the pixel with this number.
+    /// Returns the index in the image of these rows and columns of the pixel with this number.
     pub fn image_idx(&self, pixel: u32) -> usize {
         let (column, row) = self.pixel_of(pixel);
-        (row - self.first_row) as usize * self.width as usize + column as usize
+        let (column, row) = (column - self.first_column, row - self.first_row);
+        row as usize * self.n_columns as usize + column as usize
     }
 }
 
@@ -109,26 +123,31 @@ mod tests {
     const SIZES: [(u32, u32); 8] =
         [(1, 1), (1, 9), (9, 1), (5, 4), (7, 8), (16, 6), (3, 11), (64, 7)];
 
+    fn order(n_columns: u32, n_rows: u32) -> PixelOrder {
+        PixelOrder { first_row: 3, n_rows, first_column: 5, n_columns }
+    }
+
     #[test]
     fn every_pixel_has_one_number() {
         for (width, n_rows) in SIZES {
-            let order = PixelOrder { width, first_row: 3, n_rows };
+            let order = order(width, n_rows);
             let mut pixels: Vec<_> = (0..width * n_rows).map(|i| order.pixel_of(i)).collect();
             pixels.sort_by_key(|(column, row)| (*row, *column));
-            let rows = (3..3 + n_rows).flat_map(|row| (0..width).map(move |column| (column, row)));
+            let columns = 5..5 + width;
+            let rows =
+                (3..3 + n_rows).flat_map(|row| columns.clone().map(move |column| (column, row)));
             assert_eq!(pixels, rows.collect::<Vec<_>>(), "{width} x {n_rows}");
         }
     }
 
     #[test]
     fn bands_are_numbered_column_by_column() {
-        let order = PixelOrder { width: 3, first_row: 10, n_rows: 6 };
-        let pixels = [0, 1, 4, 11, 12, 13, 14].map(|i| order.pixel_of(i));
-        assert_eq!(pixels, [(0, 10), (0, 11), (1, 10), (2, 13), (0, 14), (0, 15), (1, 14)]);
+        let pixels = [0, 1, 4, 11, 12, 13, 14].map(|i| order(3, 6).pixel_of(i));
+        assert_eq!(pixels, [(5, 3), (5, 4), (6, 3), (7, 6), (5, 7), (5, 8), (6, 7)]);
     }
 
     fn check_parts((width, n_rows): (u32, u32), part_len: usize) {
-        let order = PixelOrder { width, first_row: 3, n_rows };
+        let order = order(width, n_rows);
         let colors: Vec<[f32; 4]> =
             (0..order.n_pixels()).map(|i| [i as f32, 2.0, 3.0, 0.25]).collect();
         let mut image = Image::new(width, n_rows);

@@ -27,9 +27,9 @@ pub struct FrameRecord {
     pub center: [f32; 2],
     /// Seed of all random numbers: its lower and its upper half.
     pub seed: [u32; 2],
-    /// Width of the picture in pixels.
-    pub width: u32,
-    /// Number of the pixel of the first ray among those of the rows that are rendered, in bands of rows, column by column.
+    /// Number of columns that are rendered.
+    pub n_columns: u32,
+    /// Number of the pixel of the first ray among those that are rendered, in bands of rows, column by column.
     pub first_pixel: u32,
     /// Number of rays: one for each pixel.
     pub n_rays: u32,
@@ -67,10 +67,10 @@ pub struct FrameRecord {
     pub first_row: u32,
     /// Number of rows that are rendered.
     pub n_rows: u32,
+    /// The first column that is rendered.
+    pub first_column: u32,
     /// Zero.
-    pub reserved_a: u32,
-    /// Zero.
-    pub reserved_b: u32,
+    pub reserved: u32,
     /// Normals of planes, and their distances from the scene's origin along these.
     pub planes: [[f32; 4]; MAX_PLANES],
 }

@@ -150,7 +150,7 @@ impl Renderer for GpuRenderer {
         let makes_room =
             |sizes| uploads.make_room(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
         // Pictures have at most 2^28 pixels.
-        let n_pixels = settings.width * region.n_rows();
+        let n_pixels = region.n_pixels() as u32;
         let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels, makes_room);
         let fits_memory =
             |sizes| uploads.check_memory(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
@@ -164,27 +164,14 @@ impl Renderer for GpuRenderer {
         let records = SceneRecords::new(scene, &words.offsets);
         let words = &words.buffer;
         let gpu = &self.gpu;
-        // The kernels render whole rows.
-        let rows = RenderRegion { columns: RenderRegion::whole(settings).columns, ..region };
-        let job = Job {
-            gpu,
-            kernels,
-            uploads,
-            scene,
-            settings,
-            region: rows,
-            passes,
-            sizes,
-            records,
-            words,
-        };
+        let job =
+            Job { gpu, kernels, uploads, scene, settings, region, passes, sizes, records, words };
         let kernels = job.passes.all().map(|pass| pass.kernel).collect();
         let known = part_size.take();
         let first_part = PartSize::first(gpu.info.kind, known, kernels, &scene.geometries);
         let part_size = &mut part_size.insert(first_part).n_pixels;
         let state = RendererState { arrays, times, part_size };
-        let (image, stats) = job.render(state, progress)?;
-        Ok((image.with_columns(region.columns), stats))
+        job.render(state, progress)
     }
 }
 

@@ -346,7 +346,6 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
         n_planes: scene.camera_planes.len() as u32,
         center: view.center.into(),
         seed: [settings.seed as u32, (settings.seed >> 32) as u32],
-        width: settings.width,
         is_centered: (settings.samples_per_pixel == 1).into(),
         background_top: top.to_array(),
         background,

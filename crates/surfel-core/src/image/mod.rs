@@ -75,12 +75,6 @@ impl Image {
         Self { aovs: Some(aovs), ..Self::new(width, height) }
     }
 
-    /// Returns the columns from the first to before the second.
-    pub fn with_columns(self, columns: (u32, u32)) -> Self {
-        let rows = (0, self.height);
-        self.cropped(rows, columns)
-    }
-
     /// Returns the rows and the columns from the first to before the second.
     pub fn cropped(self, rows: (u32, u32), columns: (u32, u32)) -> Self {
         if (rows, columns) == ((0, self.height), (0, self.width)) {

@@ -12,7 +12,7 @@ struct FrameRecord {
     n_planes: u32,
     center: vec2<f32>,
     seed: vec2<u32>,
-    width: u32,
+    n_columns: u32,
     first_pixel: u32,
     n_rays: u32,
     sample_idx: u32,
@@ -31,11 +31,11 @@ struct FrameRecord {
     // The least size of an octree's cells along a ray.
     pixel_at_origin: f32,
     pixel_per_distance: f32,
-    // The rows that are rendered.
+    // The rows and columns that are rendered.
     first_row: u32,
     n_rows: u32,
-    reserved_a: u32,
-    reserved_b: u32,
+    first_column: u32,
+    reserved: u32,
     // Normals of planes, and their distances from the scene's origin along these.
     planes: array<vec4<f32>, MAX_PLANES>,
 }

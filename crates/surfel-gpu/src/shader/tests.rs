@@ -66,7 +66,7 @@ fn records_have_equal_layouts() {
             n_planes,
             center,
             seed,
-            width,
+            n_columns,
             first_pixel,
             n_rays,
             sample_idx,
@@ -86,8 +86,8 @@ fn records_have_equal_layouts() {
             pixel_per_distance,
             first_row,
             n_rows,
-            reserved_a,
-            reserved_b,
+            first_column,
+            reserved,
             planes
         }),
         rust_layout!(Visit {

@@ -292,7 +292,9 @@ fn regions_are_parts_of_the_picture() {
     assert_eq!(part.color, whole.color[rows.clone()]);
     assert_eq!(part.aovs.unwrap().point_id, whole.aovs.as_ref().unwrap().point_id[rows]);
     let region = RenderRegion { columns: (7, 50), ..region };
-    let (part, _) = gpu.render_region(&scene, &SETTINGS, region, &NoProgress).unwrap();
+    let (part, stats) = gpu.render_region(&scene, &SETTINGS, region, &NoProgress).unwrap();
+    // Four samples of each pixel, and the ray through its centre.
+    assert_eq!(stats.rays.primary, 5 * 43 * 27);
     let pixels: Vec<_> = (13..40).flat_map(|y| (7..50).map(move |x| y * 80 + x)).collect();
     let colors: Vec<_> = pixels.iter().map(|pixel| whole.color[*pixel]).collect();
     assert_eq!((part.width, part.height, part.color), (43, 27, colors));
