@@ -12,7 +12,7 @@ use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::unsupported::unsupported;
 use crate::upload::{GpuTree, UploadTime, Uploads};
-use crate::wavefront::Arrays;
+use crate::wavefront::{Arrays, Capacities};
 use crate::words::SceneWords;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use surfel_core::flat::FlatScene;
@@ -141,37 +141,62 @@ impl Renderer for GpuRenderer {
             let reason = format!("the GPU does not render {} yet", missing.join(", "));
             return Err(Error::Device { device, reason }.into());
         }
-        self.gpu.check()?;
+        let gpu = &self.gpu;
+        gpu.check()?;
         let mut state = self.state();
-        let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
         let passes = Passes::new(scene, settings);
-        let scene_bytes = scene_bytes(scene, &passes);
-        let bytes = |sizes| scene_bytes + Arrays::n_bytes(sizes);
-        let makes_room =
-            |sizes| uploads.make_room(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
         // Pictures have at most 2^28 pixels.
         let n_pixels = region.n_pixels() as u32;
-        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels, makes_room);
-        let fits_memory =
-            |sizes| uploads.check_memory(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
-        let found = Arrays::free_unless_fitting(arrays, &self.gpu, sizes, fits_memory)?;
-        uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
-        let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
-        let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
-        kernels.compile(&self.gpu, passes.all().map(of_pass))?;
-        let updated = SceneWords::update(words.take(), &self.gpu, scene)?;
-        let words = words.insert(updated);
+        let (sizes, other_bytes) = state.make_room(gpu, scene, &passes, n_pixels)?;
+        state.upload(gpu, scene, &passes, other_bytes)?;
+        let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
+        let words = SceneWords::update(words, gpu, scene)?;
         let records = SceneRecords::new(scene, &words.offsets);
         let words = &words.buffer;
-        let gpu = &self.gpu;
         let job =
             Job { gpu, kernels, uploads, scene, settings, region, passes, sizes, records, words };
         let kernels = job.passes.all().map(|pass| pass.kernel).collect();
         let known = part_size.take();
         let first_part = PartSize::first(gpu.info.kind, known, kernels, &scene.geometries);
         let part_size = &mut part_size.insert(first_part).n_pixels;
-        let state = RendererState { arrays, times, part_size };
-        job.render(state, progress)
+        job.render(RendererState { arrays, times, part_size }, progress)
+    }
+}
+
+impl State {
+    /// Frees what a picture leaves no room for. Returns the sizes of its arrays, and the bytes that it takes besides trees.
+    fn make_room(
+        &mut self,
+        gpu: &Gpu,
+        scene: &FlatScene,
+        passes: &Passes,
+        n_pixels: u32,
+    ) -> Result<(Capacities, u64)> {
+        let Self { uploads, words, arrays, .. } = self;
+        SceneWords::free_unless_same(words, gpu, scene)?;
+        let scene_bytes = scene_bytes(scene, passes);
+        let bytes = |sizes| scene_bytes + Arrays::n_bytes(sizes);
+        let makes_room = |sizes| uploads.make_room(gpu, &scene.geometries, bytes(sizes)).is_ok();
+        let sizes = Job::sizes(gpu, scene, passes, n_pixels, makes_room);
+        let fits_memory =
+            |sizes| uploads.check_memory(gpu, &scene.geometries, bytes(sizes)).is_ok();
+        let found = Arrays::free_unless_fitting(arrays, gpu, sizes, fits_memory)?;
+        Ok((sizes, bytes(found)))
+    }
+
+    /// Uploads the trees and compiles the kernels of a picture that are missing.
+    fn upload(
+        &mut self,
+        gpu: &Gpu,
+        scene: &FlatScene,
+        passes: &Passes,
+        other_bytes: u64,
+    ) -> Result<()> {
+        let Self { kernels, uploads, .. } = self;
+        uploads.update(gpu, &scene.geometries, other_bytes)?;
+        let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
+        let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
+        kernels.compile(gpu, passes.all().map(of_pass))
     }
 }
 
@@ -186,6 +211,7 @@ mod tests {
     use surfel_core::Error as CoreError;
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
+    use surfel_core::scene::Texture;
     use surfel_core::surface::SurfaceKind;
 
     #[test]
@@ -241,6 +267,38 @@ mod tests {
             assert_eq!(state.arrays.as_ref().unwrap().sizes(), sizes);
         }
         assert_eq!(renderer.upload_time().n_bytes, 3 * tree_bytes);
+    }
+
+    /// Returns a scene of points with a texture of 1 MiB, which no material uses.
+    fn textured_scene() -> FlatScene {
+        let texels = vec![[200, 100, 50, 255]; 1 << 18].into();
+        let mut scene = scene_of_points(SurfaceKind::Disc);
+        scene.textures.push(Texture { width: 1 << 9, height: 1 << 9, texels });
+        scene
+    }
+
+    #[test]
+    fn too_many_texels_are_refused_before_trees_are_uploaded() {
+        let Some(mut renderer) = open_renderer() else { return };
+        renderer.gpu.info.max_array_bytes = 1 << 19;
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let error = renderer.render(&textured_scene(), &settings, &NoProgress).unwrap_err();
+        let expected = " allows 524288 bytes in one array, 1048576 are needed";
+        assert!(error.to_string().ends_with(expected), "{error}");
+        assert_eq!(renderer.upload_time().n_bytes, 0);
+    }
+
+    #[test]
+    fn texels_of_the_scene_before_are_freed_before_the_next_one_is_uploaded() {
+        let Some(renderer) = open_renderer() else { return };
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        assert!(renderer.render(&textured_scene(), &settings, &NoProgress).is_ok());
+        assert!(renderer.state().words.is_some());
+        // The trees of the next scene are refused.
+        let limited = renderer.with_memory_limit(Some(1 << 12));
+        let next = scene_of_points(SurfaceKind::Disc);
+        assert!(limited.render(&next, &settings, &NoProgress).is_err());
+        assert!(limited.state().words.is_none());
     }
 
     #[test]

@@ -326,10 +326,17 @@ fn check_pages(gpu: &Gpu, n_bytes: usize, max_pages: usize) -> Result<()> {
 
 /// Makes an array, if the device allows one of this size.
 pub fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buffer> {
+    check_array(gpu, n_bytes)?;
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    gpu.buffer(label, n_bytes as u64, usage)
+}
+
+/// Fails if the device allows no array of this size.
+pub fn check_array(gpu: &Gpu, n_bytes: usize) -> Result<()> {
     let (needed, found) = (n_bytes as u64, gpu.info.max_array_bytes);
     if found < needed {
         let limit = "bytes in one array";
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
-    gpu.buffer(label, needed, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
+    Ok(())
 }

@@ -2,9 +2,9 @@
 
 use crate::device::Gpu;
 use crate::error::Result;
-use crate::scene_records::{WordOffsets, append_words};
+use crate::scene_records::{WordOffsets, append_words, n_words};
 use crate::transfer::write;
-use crate::upload::array;
+use crate::upload::{array, check_array};
 use std::sync::Arc;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::scene::Light;
@@ -68,20 +68,43 @@ impl Source {
 }
 
 impl SceneWords {
-    /// Returns the words of a scene: `known` if they are the same.
+    /// Frees `known` unless they are the words of this scene.
     ///
     /// # Errors
     ///
-    /// Fails if they are too many for the device.
-    pub fn update(known: Option<Self>, gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+    /// Fails if the words of the scene are too many for the device, or if it has failed.
+    pub fn free_unless_same(known: &mut Option<Self>, gpu: &Gpu, scene: &FlatScene) -> Result<()> {
+        check_array(gpu, 4 * n_words(scene))?;
         let source = Source::new(scene);
-        if let Some(known) = known.filter(|known| known.source == source) {
-            return Ok(known);
+        match known.take_if(|known| known.source != source) {
+            // The memory is free once the device has finished with it.
+            Some(_) => gpu.wait(),
+            None => Ok(()),
         }
+    }
+
+    /// Returns `known`, which [`SceneWords::free_unless_same`] has left, or the words of the scene.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the device has too little memory.
+    pub fn update<'a>(
+        known: &'a mut Option<Self>,
+        gpu: &Gpu,
+        scene: &FlatScene,
+    ) -> Result<&'a Self> {
+        let words = match known.take() {
+            Some(words) => words,
+            None => Self::new(gpu, scene)?,
+        };
+        Ok(known.insert(words))
+    }
+
+    fn new(gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
         let mut words = Vec::new();
         let offsets = append_words(scene, &mut words);
         let buffer = array(gpu, "textures", 4 * words.len())?;
         write(gpu, &buffer, bytemuck::cast_slice(&words))?;
-        Ok(Self { source, buffer, offsets })
+        Ok(Self { source: Source::new(scene), buffer, offsets })
     }
 }
