@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::kernel_times::KernelTimes;
 use crate::kernels::Kernels;
 use crate::numbers::MAX_QUEUE_ENTRIES;
-use crate::part_size::next_part;
+use crate::part_size::PartSize;
 use crate::passes::{Pass, PassStage, Passes};
 use crate::pixel_order::{PixelOrder, set_pixels};
 use crate::records::{FrameRecord, HitRecord};
@@ -69,8 +69,8 @@ pub struct RendererState<'a> {
     pub arrays: &'a mut Option<Arrays>,
     /// The times of kernels.
     pub times: &'a mut KernelTimes,
-    /// Number of pixels of the next part.
-    pub part_size: &'a mut u32,
+    /// The size of the next part.
+    pub part_size: &'a mut PartSize,
 }
 
 /// A picture while its parts are rendered.
@@ -81,8 +81,7 @@ struct Picture<'a> {
     stats: RenderStats,
     /// The time at which the last part was there.
     last_arrival: Instant,
-    /// Number of pixels of the next part.
-    part_size: &'a mut u32,
+    part_size: &'a mut PartSize,
     progress: &'a dyn Progress,
 }
 
@@ -173,15 +172,15 @@ impl Job<'_> {
     ) -> surfel_core::Result<()> {
         let wavefront = submitter.wavefront();
         let n_pixels = picture.order.n_pixels();
-        let mut max_part = self.sizes.n_pixels;
         let (mut first_pixel, mut parity) = (0, 0);
         let mut working: Option<Part> = None;
         while first_pixel < n_pixels {
-            let n_rays = (*picture.part_size).min(max_part).min(n_pixels - first_pixel);
+            let max_rays = self.sizes.n_pixels.min(n_pixels - first_pixel);
+            let n_rays = picture.part_size.n_pixels().min(max_rays);
             let frame = FrameRecord { first_pixel, n_rays, ..frame };
             let start = Instant::now();
             if self.submit_part(submitter, frame)? == Outcome::Overflow {
-                max_part = self.smaller_part(n_rays)?;
+                picture.part_size.limit(self.smaller_part(n_rays)?);
                 continue;
             }
             self.add_aovs(submitter, frame, picture)?;
@@ -346,8 +345,7 @@ impl Job<'_> {
         picture.stats.rays += counts.rays();
         // The device begins a part when it has finished the one before.
         let time = arrival.saturating_duration_since(start.max(picture.last_arrival));
-        *picture.part_size =
-            next_part(*picture.part_size, n_pixels, time / self.region.n_samples());
+        picture.part_size.learn(n_pixels, time / self.region.n_samples());
         picture.last_arrival = arrival;
         picture.progress.advance(n_pixels.into());
         Ok(())

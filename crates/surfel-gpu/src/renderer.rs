@@ -156,9 +156,8 @@ impl Renderer for GpuRenderer {
         let job =
             Job { gpu, kernels, uploads, scene, settings, region, passes, sizes, records, words };
         let kernels = job.passes.all().map(|pass| pass.kernel).collect();
-        let known = part_size.take();
-        let first_part = PartSize::first(gpu.info.kind, known, kernels, &scene.geometries);
-        let part_size = &mut part_size.insert(first_part).n_pixels;
+        let first_part = PartSize::first(gpu.info.kind, part_size.take(), kernels, scene);
+        let part_size = part_size.insert(first_part);
         job.render(RendererState { arrays, times, part_size }, progress)
     }
 }
