@@ -10,6 +10,7 @@ use crate::numbers::count;
 use crate::numbers::lens;
 use crate::numbers::light_kind;
 use crate::numbers::miss;
+use crate::numbers::path_state;
 use crate::numbers::queue;
 use crate::numbers::texture;
 use crate::numbers::{
@@ -95,6 +96,10 @@ fn numbers() -> Vec<(&'static str, u32)> {
         ("MISS_THROUGH_GLASS", miss::THROUGH_GLASS),
         ("MISS_SKY", miss::SKY),
         ("MISS_SKY_WITH_SUN", miss::SKY_WITH_SUN),
+        ("PATH_BOUNCE", path_state::BOUNCE),
+        ("PATH_ALPHA_LAYER", path_state::ALPHA_LAYER),
+        ("PATH_MISS", path_state::MISS),
+        ("MAX_PATH_COUNT", path_state::MAX_COUNT),
         ("ALPHA_MASK", alpha_mode::MASK),
         ("ALPHA_BLEND", alpha_mode::BLEND),
         ("BASE_COLOR_TEXTURE", texture::BASE_COLOR),

@@ -122,6 +122,19 @@ pub mod miss {
     pub const SKY_WITH_SUN: u32 = 3;
 }
 
+/// The state of a path in one word: the number of its bounces and of the alpha-blended layers behind it, eight bits each,
+/// and the number of the radiance that it finds if its ray leaves the scene.
+pub mod path_state {
+    /// A bounce.
+    pub const BOUNCE: u32 = 1;
+    /// An alpha-blended layer.
+    pub const ALPHA_LAYER: u32 = 1 << 8;
+    /// Number of the lowest bit of the number of the radiance.
+    pub const MISS: u32 = 16;
+    /// Maximum number of bounces, and of layers.
+    pub const MAX_COUNT: u32 = 255;
+}
+
 /// Numbers of interpretations of alpha.
 pub mod alpha_mode {
     /// Alpha is ignored.

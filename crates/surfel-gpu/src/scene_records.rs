@@ -6,6 +6,7 @@ use crate::numbers::alpha_mode;
 use crate::numbers::background;
 use crate::numbers::lens;
 use crate::numbers::light_kind;
+use crate::numbers::path_state;
 use crate::numbers::texture;
 use crate::numbers::{MAX_PLANES, NO_LIMIT, NONE};
 use crate::records::{FrameRecord, InstanceRecord, LightRecord, MaterialRecord, TextureRecord};
@@ -353,7 +354,7 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
         height: settings.height,
         background_up: scene.camera.view_up.as_vec3().normalize_or(Vec3::Z).to_array(),
         n_lights: (scene.lights.len() + scene.punctual_lights.len()) as u32,
-        max_depth: settings.max_depth,
+        max_depth: settings.max_depth.min(path_state::MAX_COUNT),
         n_light_samples: n_light_samples(settings),
         pixel_at_origin: if is_parallel { view.pixel_size() } else { 0.0 },
         pixel_per_distance: if is_parallel { 0.0 } else { view.pixel_size() },
@@ -365,4 +366,20 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
 /// Returns the number of rays toward each extended light from a hit of a camera ray.
 pub fn n_light_samples(settings: &Settings) -> u32 {
     settings.light_samples.div_ceil(settings.samples_per_pixel)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Settings keep the limits of the kernels.
+
+    use super::*;
+    use crate::test_support::empty_scene;
+
+    #[test]
+    fn more_bounces_than_a_path_counts_do_not_begin_anew() {
+        let scene = empty_scene();
+        let settings = Settings { max_depth: 256, ..Settings::default() };
+        let view = scene.camera.view(scene.origin, settings.width, settings.height);
+        assert_eq!(frame(&scene, &view, &settings).max_depth, 255);
+    }
 }

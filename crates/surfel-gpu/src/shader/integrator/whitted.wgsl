@@ -60,7 +60,7 @@ fn shade_path(arriving: Path, hit: HitRecord, point: ptr<function, ShadingPointR
     let lobes = lobes_of(shading, path.ray.direction, interface_media.eta);
     let is_rough = MIN_ROUGHNESS <= shading.roughness;
     let glossy = select(vec3<f32>(0.0), lobes.reflected, is_rough);
-    if (path.state & 0xffu) < frame.max_depth {
+    if n_bounces(path) < frame.max_depth {
         add_branches(path, shading, interface_media, lobes.reflected, REFLECTED);
         add_branches(path, shading, interface_media, lobes.refracted, REFRACTED);
     }
@@ -80,8 +80,21 @@ fn behind_gaussians(path: Path, hit: HitRecord) -> Path {
     return behind;
 }
 
+fn n_bounces(path: Path) -> u32 {
+    return path.state & MAX_PATH_COUNT;
+}
+
+fn n_alpha_layers(path: Path) -> u32 {
+    return path.state / PATH_ALPHA_LAYER & MAX_PATH_COUNT;
+}
+
 fn miss_behavior(path: Path) -> u32 {
-    return path.state >> 16u;
+    return path.state >> PATH_MISS;
+}
+
+// Returns the state of a path that finds another radiance if its ray leaves the scene.
+fn with_miss_behavior(path: Path, behavior: u32) -> u32 {
+    return extractBits(path.state, 0u, PATH_MISS) | behavior << PATH_MISS;
 }
 
 fn shading_point(
@@ -130,7 +143,7 @@ fn add_branches(path: Path, shading: Shading, interface_media: Interface, fracti
     var branch = path;
     branch.weight = weight / f32(n_branches);
     branch.key = hash(path.key ^ vec2<u32>(lobe, 0u));
-    branch.state += 1u;
+    branch.state += PATH_BOUNCE;
     for (var i = 0u; i < n_branches; i++) {
         branch.index = path.index * n_branches + i;
         if lobe == REFLECTED {
@@ -162,13 +175,13 @@ fn shade_miss(path: Path) {
 
 // Queues the part of a path that an alpha-blended surface lets pass.
 fn continue_through_alpha(path: Path, shading: Shading) {
-    if MAX_ALPHA_LAYERS <= (path.state >> 8u & 0xffu) {
+    if MAX_ALPHA_LAYERS <= n_alpha_layers(path) {
         return;
     }
     var next = from_surface(path, shading, spawn(shading, path.ray.direction), path.media);
     next.weight *= 1.0 - shading.alpha;
     next.key = hash(path.key ^ vec2<u32>(ALPHA_LAYER, 0u));
-    next.state += 256u;
+    next.state += PATH_ALPHA_LAYER;
     add_path(next);
 }
 
@@ -190,7 +203,7 @@ fn add_reflection(branch: Path, shading: Shading, media: vec4<u32>) {
             / directional_albedo(facet.cos_view, shading.roughness);
     }
     let behavior = select(MISS_SKY, MISS_SKY_WITH_SUN, facet.cos_view == 0.0);
-    next.state = (branch.state & 0xffffu) | (behavior << 16u);
+    next.state = with_miss_behavior(branch, behavior);
     add_path(next);
 }
 
@@ -216,7 +229,7 @@ fn add_refraction(branch: Path, shading: Shading, interface_media: Interface) {
     let direction = select(incident, refracted.direction, is_behind);
     var next = from_surface(branch, shading, spawn(shading, direction), interface_media.far);
     if miss_behavior(branch) == MISS_BACKGROUND {
-        next.state = (branch.state & 0xffffu) | (MISS_THROUGH_GLASS << 16u);
+        next.state = with_miss_behavior(branch, MISS_THROUGH_GLASS);
     }
     add_path(next);
 }

@@ -21,5 +21,6 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let ray = camera_ray(vec2<f32>(pixel_of(ray_idx)) + offset);
     let one = vec3<f32>(1.0);
-    paths[ray_idx] = Path(ray, one, ray_idx, one, 0.0, vec4<u32>(NONE), key, frame.sample_idx, MISS_BACKGROUND << 16u);
+    let state = MISS_BACKGROUND << PATH_MISS;
+    paths[ray_idx] = Path(ray, one, ray_idx, one, 0.0, vec4<u32>(NONE), key, frame.sample_idx, state);
 }
