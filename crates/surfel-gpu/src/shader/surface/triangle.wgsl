@@ -17,9 +17,14 @@ fn project(frame: RayFrame, corner: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(dot(corner, frame.tangent), dot(corner, frame.bitangent));
 }
 
-// Returns the edge function at the origin: its sign tells on which side the edge passes.
+// Returns the edge function at the origin: its sign tells on which side the edge passes. Both triangles at an edge
+// evaluate it from the same end, as a driver may fuse the subtraction with one of the products, which rounds them apart.
 fn edge_function(start: vec2<f32>, end: vec2<f32>) -> f32 {
-    return start.x * end.y - start.y * end.x;
+    let is_from_start = start.x < end.x || start.x == end.x && start.y < end.y;
+    let first = select(end, start, is_from_start);
+    let last = select(start, end, is_from_start);
+    let value = first.x * last.y - first.y * last.x;
+    return select(-value, value, is_from_start);
 }
 
 // Returns the distance to both sides of a triangle whose corners are relative to the ray's origin, or -1 without a hit
