@@ -57,10 +57,10 @@ fn ggx_alpha(roughness: f32) -> f32 {
 fn sample_ggx_vndf(view: vec3<f32>, roughness: f32, uv: vec2<f32>) -> vec3<f32> {
     let alpha = ggx_alpha(roughness);
     let stretched = normalize(vec3<f32>(alpha * view.x, alpha * view.y, view.z));
-    let angle = TAU * uv.x;
+    let turned = cos_sin(TAU * uv.x);
     let z = (1.0 - uv.y) * (1.0 + stretched.z) - stretched.z;
     let sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
-    let cap = vec3<f32>(sine * cos(angle), sine * sin(angle), z) + stretched;
+    let cap = vec3<f32>(sine * turned, z) + stretched;
     let normal = vec3<f32>(alpha * cap.x, alpha * cap.y, max(cap.z, 0.0));
     let squared = dot(normal, normal);
     return select(vec3<f32>(0.0, 0.0, 1.0), normal * inverseSqrt(max(squared, 1e-37)), 1e-37 < squared);

@@ -11,15 +11,24 @@ fn disk(uv: vec2<f32>) -> vec2<f32> {
         return vec2<f32>(0.0);
     }
     if abs(b) < abs(a) {
-        return a * cos_sin(TAU / 8.0 * (b / a));
+        return a * cos_sin_of_eighth(TAU / 8.0 * (b / a));
     }
-    return b * cos_sin(TAU / 8.0 * (a / b)).yx;
+    return b * cos_sin_of_eighth(TAU / 8.0 * (a / b)).yx;
 }
 
-// Returns the cosine and the sine of an angle of at most an eighth of a turn, to a unit in the last place (polynomials of
-// Moshier's Cephes library). Devices have functions of their own with a hundred times the error, by which rays pass other
-// sides of rims than on the CPU.
+// Returns the cosine and the sine of an angle of a few turns at most, to a unit in the last place. Devices have functions
+// of their own with a hundred times the error, by which rays pass other sides of rims than on the CPU.
 fn cos_sin(angle: f32) -> vec2<f32> {
+    let n_quarters = round(angle * (4.0 / TAU));
+    // A quarter of a turn in two parts: products with the first one are exact.
+    let found = cos_sin_of_eighth((angle - n_quarters * 1.5703125) - n_quarters * 4.838267949e-4);
+    let quarter = u32(i32(n_quarters)) & 3u;
+    let turned = select(found, vec2<f32>(-found.y, found.x), (quarter & 1u) == 1u);
+    return select(turned, -turned, 2u <= quarter);
+}
+
+// Returns the cosine and the sine of an angle of at most an eighth of a turn (polynomials of Moshier's Cephes library).
+fn cos_sin_of_eighth(angle: f32) -> vec2<f32> {
     let square = angle * angle;
     let of_cos = (2.4433157118e-5 * square - 1.3887316255e-3) * square + 4.1666645683e-2;
     let of_sin = (-1.9515295891e-4 * square + 8.3321608736e-3) * square - 1.6666654611e-1;

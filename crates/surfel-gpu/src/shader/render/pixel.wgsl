@@ -14,8 +14,10 @@ fn add_alpha(pixel: u32, alpha: f32) {
 }
 
 fn add_channel(pixel: u32, channel: u32, value: f32) {
-    // NaN fails the comparison.
-    if !(0.0 < value) {
+    // Bits are compared, because a driver may take no number for NaN: those of NaN and of negative numbers are greater than
+    // those of infinity.
+    let bits = bitcast<u32>(value);
+    if bits == 0u || 0x7f800000u < bits {
         return;
     }
     let summand = min(value, MAX_SUMMAND);

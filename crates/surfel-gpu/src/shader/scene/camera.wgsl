@@ -6,9 +6,10 @@ fn camera_ray(position: vec2<f32>) -> Ray {
     let along = frame.center.y - position.y;
     var ray = Ray(frame.position, 0.0, frame.forward, NO_LIMIT);
     if frame.lens == PANORAMA {
-        let level = cos(frame.pixel_width * across) * frame.forward + sin(frame.pixel_width * across) * frame.right;
-        let angle = frame.pixel_height * along;
-        ray.direction = normalize(cos(angle) * level + sin(angle) * frame.up);
+        let azimuth = cos_sin(frame.pixel_width * across);
+        let elevation = cos_sin(frame.pixel_height * along);
+        let level = azimuth.x * frame.forward + azimuth.y * frame.right;
+        ray.direction = normalize(elevation.x * level + elevation.y * frame.up);
     } else {
         let offset = frame.pixel_width * across * frame.right + frame.pixel_height * along * frame.up;
         if frame.lens == PERSPECTIVE {

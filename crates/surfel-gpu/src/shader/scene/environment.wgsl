@@ -17,7 +17,7 @@ fn environment_density(light: LightRecord, direction: vec3<f32>) -> f32 {
     let probability =
         cell_probability(row_cdf(light), light.size.y, cell.y) * cell_probability(column_cdf(light, cell.y), light.size.x, cell.x);
     let step = PI / f32(light.size.y);
-    let height = 2.0 * sin(step * (f32(cell.y) + 0.5)) * sin(0.5 * step);
+    let height = 2.0 * cos_sin(step * (f32(cell.y) + 0.5)).y * cos_sin(0.5 * step).y;
     return probability / (TAU / f32(light.size.x) * height);
 }
 
@@ -69,18 +69,18 @@ fn column_cdf(light: LightRecord, y: u32) -> u32 {
 fn sample_environment(light: LightRecord, uv: vec2<f32>) -> vec3<f32> {
     let row = sample_cell(row_cdf(light), light.size.y, uv.y);
     let column = sample_cell(column_cdf(light, row.cell), light.size.x, uv.x);
-    let azimuth = TAU * ((f32(column.cell) + column.offset) / f32(light.size.x) - 0.5);
+    let azimuth = cos_sin(TAU * ((f32(column.cell) + column.offset) / f32(light.size.x) - 0.5));
     // The angles are those from the nearer pole, where all heights would be one single float.
     let is_below = light.size.y <= 2u * row.cell;
     let begin = select(row.cell, light.size.y - row.cell, is_below);
     let end = select(row.cell + 1u, light.size.y - row.cell - 1u, is_below);
     let half_step = 0.5 * PI / f32(light.size.y);
-    let sines = sin(half_step * vec2<f32>(f32(begin), f32(end)));
+    let sines = vec2<f32>(cos_sin(half_step * f32(begin)).y, cos_sin(half_step * f32(end)).y);
     let depth = 2.0 * mix(sines.x * sines.x, sines.y * sines.y, row.offset);
     let level = sqrt(max(depth * (2.0 - depth), 0.0));
     let height = select(1.0 - depth, depth - 1.0, is_below);
     return normalize(
-        level * sin(azimuth) * light.direction + level * cos(azimuth) * light.color + height * light.ground,
+        level * azimuth.y * light.direction + level * azimuth.x * light.color + height * light.ground,
     );
 }
 
