@@ -209,6 +209,16 @@ impl PointCloud {
                 Values::F64(column) => retain(column, start, keep),
             }
         }
+        for Morph { positions, normals, tangents, radii } in &mut self.morphs {
+            retain(positions, start, keep);
+            normals.iter_mut().for_each(|column| retain(column, start, keep));
+            tangents.iter_mut().for_each(|column| retain(column, start, keep));
+            radii.iter_mut().for_each(|column| retain(column, start, keep));
+        }
+        if let Some(Skin { joints, weights }) = &mut self.skin {
+            retain(joints, start, keep);
+            retain(weights, start, keep);
+        }
     }
 
     /// Returns an origin for points at these world positions: their median, rounded to whole units.
@@ -297,6 +307,39 @@ mod tests {
         sample.extend([DVec3::splat(3.4e38); 20]);
         assert_eq!(PointCloud::choose_origin(&sample), DVec3::new(500_000.0, 4_900_001.0, 100.0));
         assert_eq!(PointCloud::choose_origin(&sample[10..]), DVec3::ZERO);
+    }
+
+    #[test]
+    fn points_that_stay_keep_all_their_columns() {
+        let cloud = |values: &[f32]| {
+            let vectors: Vec<Vec3> = values.iter().copied().map(Vec3::splat).collect();
+            let indices: Vec<u32> = values.iter().map(|value| *value as u32).collect();
+            let bytes = || values.iter().map(|value| *value as u8).collect::<Vec<u8>>();
+            let morph = Morph {
+                positions: vectors.clone(),
+                normals: Some(vectors.clone()),
+                tangents: Some(vectors.clone()),
+                radii: Some(values.to_vec()),
+            };
+            PointCloud {
+                normals: Some(vectors.clone()),
+                radii: Some(values.to_vec()),
+                colors: Some(indices.iter().map(|i| [*i as u16; 3]).collect()),
+                intensity: Some(values.to_vec()),
+                classification: Some(bytes()),
+                source_indices: Some(indices.clone()),
+                scalars: vec![Scalar { name: "a".into(), values: Values::U8(bytes()) }],
+                morphs: vec![morph],
+                skin: Some(Skin {
+                    joints: indices.iter().map(|i| [*i as u16; 4]).collect(),
+                    weights: values.iter().map(|value| [*value; 4]).collect(),
+                }),
+                ..PointCloud::from_positions(vectors)
+            }
+        };
+        let mut kept = cloud(&[0.0, 1.0, 2.0, 3.0, 4.0]);
+        kept.retain_from(1, &[false, true, true, false]);
+        assert!(kept == cloud(&[0.0, 2.0, 3.0]), "{kept:?}");
     }
 
     #[test]
