@@ -49,7 +49,7 @@ impl LegendBlock {
                     }
                     _ => title,
                 };
-                let ticks = ticks(low, high, 6);
+                let ticks = ticks(low.min(high), low.max(high), 6);
                 Some(Self::Bar { title, low, high, colors, ticks })
             }
         }
@@ -97,7 +97,7 @@ impl LegendBlock {
                 };
                 draw_bar(canvas, bar, colors);
                 for (value, text) in ticks {
-                    let fraction = if low < high { (value - low) / (high - low) } else { 0.5 };
+                    let fraction = fraction_of(*value, *low, *high);
                     let at = bar.y + bar.height * (1.0 - fraction as f32);
                     let thickness = (0.08 * size).max(1.0);
                     let x = bar.x + bar.width;
@@ -114,6 +114,11 @@ impl LegendBlock {
     fn max_rows(text_size: f32, picture_height: f32) -> usize {
         ((picture_height / text_size - 2.0 - 2.0 * PADDING) / ROW).max(0.0) as usize
     }
+}
+
+/// Returns how far up a colour bar from `low` to `high`, which may be the lower one, a value lies: 0 to 1.
+fn fraction_of(value: f64, low: f64, high: f64) -> f64 {
+    if low == high { 0.5 } else { (value - low) / (high - low) }
 }
 
 /// Draws the colours from the bottom to the top.
@@ -136,9 +141,25 @@ fn draw_bar(canvas: &mut Canvas, bar: Area, colors: &[[u8; 3]]) {
 
 #[cfg(test)]
 mod tests {
-    //! Titles of colour bars.
+    //! Titles and ticks of colour bars.
 
     use super::*;
+
+    #[test]
+    fn a_reversed_range_has_the_ticks_of_the_range() {
+        let ticks_of = |low: f64, high: f64| {
+            let legend = Legend::Map { title: String::new(), low, high, colors: vec![[0; 3]; 2] };
+            match LegendBlock::new(legend, Unit::Unknown) {
+                Some(LegendBlock::Bar { ticks, .. }) => ticks,
+                _ => Vec::new(),
+            }
+        };
+        let (rising, falling) = (ticks_of(100.0, 900.0), ticks_of(900.0, 100.0));
+        assert!(3 < rising.len() && rising == falling, "{rising:?} {falling:?}");
+        assert_eq!([100.0, 300.0, 900.0].map(|x| fraction_of(x, 100.0, 900.0)), [0.0, 0.25, 1.0]);
+        assert_eq!([100.0, 300.0, 900.0].map(|x| fraction_of(x, 900.0, 100.0)), [1.0, 0.75, 0.0]);
+        assert_eq!(fraction_of(5.0, 5.0, 5.0), 0.5);
+    }
 
     #[test]
     fn elevations_have_the_unit_of_the_coordinates_if_it_is_known() {
