@@ -21,8 +21,8 @@ pub(super) struct Mapping<'c> {
     /// Positions of the first and last colour in the map, from 0 to 1.
     map_range: (f32, f32),
     gamma: Gamma,
-    /// The origin of the range, for a note to the user.
-    range_origin: &'static str,
+    /// The origin of a range that is not given, for a note to the user.
+    range_origin: Option<&'static str>,
 }
 
 impl<'c> Mapping<'c> {
@@ -35,8 +35,11 @@ impl<'c> Mapping<'c> {
         let value_at = source.values(cloud, coloring).ok_or_else(|| source.missing_from(cloud))?;
         let given = coloring.range.map(|(low, high)| PercentileRange { low, high });
         let (range, range_origin) = match given {
-            Some(given) => (given, "as given"),
-            None => source.automatic_range(cloud.len(), &value_at),
+            Some(given) => (given, None),
+            None => {
+                let (range, origin) = source.automatic_range(cloud.len(), &value_at);
+                (range, Some(origin))
+            }
         };
         let map = coloring.colormap.unwrap_or(source.default_colormap());
         let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
@@ -57,8 +60,9 @@ impl<'c> Mapping<'c> {
     /// Returns the range and the name of the map, for a note to the user.
     pub fn description(&self) -> String {
         let Self { range, range_origin, map, gamma, .. } = self;
+        let origin = range_origin.map_or_else(String::new, |origin| format!(" ({origin})"));
         let gamma = gamma.described().map_or_else(String::new, |gamma| format!(", {gamma}"));
-        format!("from {} ({range_origin}), map {}{gamma}", format_range(*range), map.name())
+        format!("from {}{origin}, map {map}{gamma}", format_range(*range))
     }
 }
 

@@ -184,6 +184,17 @@ mod tests {
     }
 
     #[test]
+    fn the_note_about_colors_names_reversed_maps_and_no_origin_of_ranges_that_it_is_told() {
+        let listener = Listener(Mutex::default());
+        let reversed = Some(Colormap::from_name("turbo_r").unwrap());
+        let range = Some((0.0, 10.0));
+        let coloring = Coloring { range, colormap: reversed, ..coloring(Some("elevation")) };
+        colorize(&lattice(), &coloring, &listener).unwrap();
+        let notes = listener.0.into_inner().unwrap();
+        assert_eq!(notes, ["color elevation from 0.00 to 10.00, map turbo_r"]);
+    }
+
+    #[test]
     fn the_range_of_several_clouds_is_that_of_all_their_values() {
         let low = lattice();
         let high = PointCloud { origin: crate::math::DVec3::new(0.0, 0.0, 2500.0), ..lattice() };
