@@ -46,6 +46,9 @@ const TURNS: Checked = Checked {
     expected: "a number other than 0, from -1000 to 1000",
 };
 
+/// Maximum angle between two keys of a rotation, for the same reason.
+const MAX_TURN_DEG: f64 = 360_000.0;
+
 const SECONDS: Checked =
     Checked { allows: |x| (1e-3..=1e6).contains(&x), expected: "seconds from 0.001 to 1000000" };
 
@@ -287,8 +290,8 @@ impl AnimationDescription {
                 Interpolation::Cubic => Interpolation::Ease,
                 other => other,
             };
-            let turns: Vec<DQuat> = values.iter().map(Rotation::quaternion).collect();
-            tracks.push(Track::Rotation(self.keys_of("rotate", turns, interpolation)?));
+            let keys = self.keys_of("rotate", values.clone(), interpolation)?;
+            tracks.push(Track::Rotation(rotation_keys(&keys)?));
         }
         tracks.extend(self.keyed("scale", &self.scale)?.map(Track::Scale));
         if let Some(flags) = &self.visible {
@@ -340,6 +343,40 @@ impl AnimationDescription {
     }
 }
 
+/// Returns keys of a rotation that turns as the angles of `keys` say. Interpolation takes the shorter way between two keys, so
+/// there are others between those that are half a turn or more apart.
+fn rotation_keys(keys: &Keyframes<Rotation>) -> Result<Keyframes<DQuat>, Invalid> {
+    /// Number of steps of a span with a smooth start and end: from one to the next the speed changes by a sixteenth of the
+    /// greatest at most.
+    const N_EASED: usize = 64;
+    let Keyframes { times_secs, values, interpolation } = keys;
+    let spans = values.windows(2).zip(times_secs.windows(2));
+    let turns = spans.clone().map(|(pair, _)| pair[0].turn_deg(&pair[1])).fold(0.0, f64::max);
+    if MAX_TURN_DEG < turns {
+        let text =
+            format!("turns by {turns} degrees between two keys; expected at most {MAX_TURN_DEG}");
+        return Err(Invalid::at("rotate", text));
+    }
+    if turns < 180.0 || *interpolation == Interpolation::Step {
+        let values = values.iter().map(Rotation::quaternion).collect();
+        let (times_secs, interpolation) = (times_secs.clone(), *interpolation);
+        return Ok(Keyframes { times_secs, values, interpolation });
+    }
+    let is_eased = *interpolation == Interpolation::Ease;
+    let steps = spans.flat_map(|(pair, times)| {
+        let n_turning = (pair[0].turn_deg(&pair[1]) / 120.0).ceil() as usize;
+        let n = n_turning.max(if is_eased { N_EASED } else { 1 });
+        (0..n).map(move |i| {
+            let weight = i as f64 / n as f64;
+            let eased = if is_eased { weight * weight * (3.0 - 2.0 * weight) } else { weight };
+            (times[0] + weight * (times[1] - times[0]), pair[0].toward(&pair[1], eased))
+        })
+    });
+    let last = times_secs.last().copied().zip(values.last().map(Rotation::quaternion));
+    let (times_secs, values) = steps.chain(last).unzip();
+    Ok(Keyframes { times_secs, values, interpolation: Interpolation::Linear })
+}
+
 fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
@@ -368,7 +405,8 @@ impl CameraMotion {
         };
         let Some(Orbit { seconds, turns, axis }) = self.orbit else { return moved };
         let axis = axis.unwrap_or(up.as_dvec3()).try_normalize().unwrap_or(DVec3::Z);
-        let turn = DQuat::from_axis_angle(axis, TAU * turns * time_secs / seconds);
+        let turn_rad = TAU * turns * time_secs.clamp(0.0, seconds) / seconds;
+        let turn = DQuat::from_axis_angle(axis, turn_rad);
         moved.rotated_about_focal_point(turn)
     }
 

@@ -89,6 +89,37 @@ impl Rotation {
             }
         }
     }
+
+    /// Returns the rotation at a weight from 0 (this one) to 1 (`other`): by the angles if these turn by half a turn or more,
+    /// and the shorter way otherwise.
+    pub(super) fn toward(&self, other: &Self, weight: f64) -> DQuat {
+        match (*self, *other) {
+            _ if self.turn_deg(other) < 180.0 => {
+                self.quaternion().slerp(other.quaternion(), weight)
+            }
+            (Self::AxisAngle { axis, angle: from }, Self::AxisAngle { angle: to, .. }) => {
+                let angle = from + weight * (to - from);
+                Self::AxisAngle { axis, angle }.quaternion()
+            }
+            (Self::Degrees(from), Self::Degrees(to)) => {
+                Self::Degrees(from.lerp(to, weight)).quaternion()
+            }
+            _ => self.quaternion(),
+        }
+    }
+
+    /// Returns by how many degrees the angles turn from this rotation to another about the same axes; 0 if the axes differ.
+    pub(super) fn turn_deg(&self, other: &Self) -> f64 {
+        match (*self, *other) {
+            (Self::Degrees(from), Self::Degrees(to)) => (to - from).abs().max_element(),
+            (Self::AxisAngle { axis: a, angle: from }, Self::AxisAngle { axis: b, angle: to })
+                if a.normalize_or_zero().distance(b.normalize_or_zero()) < 1e-9 =>
+            {
+                (to - from).abs()
+            }
+            _ => 0.0,
+        }
+    }
 }
 
 /// `[x, y, z]` in degrees, or `{ axis = [0, 0, 1], angle = 90 }`.

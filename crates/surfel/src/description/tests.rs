@@ -4,7 +4,7 @@ use super::*;
 use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::scene::color::ColorSource;
-use surfel_core::scene::{Camera, Projection};
+use surfel_core::scene::{Camera, Projection, Track};
 use surfel_core::surface::SurfaceKind;
 
 fn parse(text: &str) -> Result<SceneDescription, Invalid> {
@@ -348,4 +348,53 @@ fn keys_of_the_camera_change_its_projection() {
     assert_eq!(flat.projection, Projection::Orthographic { height: 6.0 });
     let wrong = text.replace("[30, 60]", "[30, 180]");
     assert!(error(&wrong).contains("angles"), "{}", error(&wrong));
+}
+
+/// Returns the angles about z in degrees, from 0 to 360, of an object with these lines of keys at times.
+fn angles_at(keys: &str, times_secs: &[f64]) -> Vec<f64> {
+    let object = "[[object]]\nfile = \"ball.ply\"\nname = \"ball\"";
+    let scene = parse(&format!("{object}\n[[animation]]\nobject = \"ball\"\n{keys}")).unwrap();
+    let motion = scene.animations[0].object_motion().unwrap();
+    let Track::Rotation(keys) = &motion.tracks[0] else { panic!("no rotation") };
+    let at = |time: &f64| {
+        let turned = keys.at(*time) * DVec3::X;
+        turned.y.atan2(turned.x).to_degrees().round().rem_euclid(360.0)
+    };
+    times_secs.iter().map(at).collect()
+}
+
+#[test]
+fn rotations_by_half_a_turn_and_more_turn_as_their_angles_say() {
+    let whole = "times = [0, 4]\nrotate = [[0, 0, 0], [0, 0, 360]]";
+    let times = [0.0, 0.5, 1.0, 3.0, 4.0, 9.0];
+    assert_eq!(angles_at(whole, &times), [0.0, 45.0, 90.0, 270.0, 0.0, 0.0]);
+    let about_axis = "times = [0, 4]\nrotate = [{ axis = [0, 0, 2], angle = 0 }, { axis = [0, 0, 1], angle = -270 }]";
+    assert_eq!(angles_at(about_axis, &[2.0, 4.0]), [225.0, 90.0]);
+    // Less than half a turn takes the shorter way, also beside others.
+    let mixed = "times = [0, 1, 2]\nrotate = [[0, 0, 0], [0, 0, 90], [0, 0, 270]]";
+    assert_eq!(angles_at(mixed, &[0.5, 1.0, 1.5]), [45.0, 90.0, 180.0]);
+    let eased = format!("{whole}\ninterpolation = \"ease\"");
+    assert_eq!(angles_at(&eased, &[0.0, 1.0, 2.0]), [0.0, 56.0, 180.0]);
+    let stepped = format!("{whole}\ninterpolation = \"step\"");
+    assert_eq!(angles_at(&stepped, &[1.0, 3.9]), [0.0, 0.0]);
+    let endless =
+        "[[animation]]\nobject = \"a\"\ntimes = [0, 1]\nrotate = [[0, 0, 0], [0, 0, 1e9]]";
+    assert!(error(endless).contains("expected at most 360000"), "{}", error(endless));
+}
+
+#[test]
+fn the_camera_stays_where_its_orbit_ends() {
+    let text = "[[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 4\nturns = 0.25";
+    let scene = parse(text).unwrap();
+    let mut motion = CameraMotion::default();
+    scene.animations[0].camera_motion(&mut motion).unwrap();
+    let projection = Projection::Perspective { view_angle_deg: 20.0 };
+    let position_at = |time_secs: f64| {
+        let (position, focal_point) = (DVec3::X, DVec3::ZERO);
+        let camera = Camera { position, focal_point, view_up: DVec3::Z, projection };
+        motion.at(time_secs, camera, Vec3::Z).position
+    };
+    assert!(position_at(4.0).distance(DVec3::Y) < 1e-9);
+    assert_eq!(position_at(6.0), position_at(4.0));
+    assert_eq!(position_at(-1.0), position_at(0.0));
 }
