@@ -1,7 +1,8 @@
 //! Longitudes and latitudes in metres: in degrees, a scan is a needle as high as its heights.
 
 use super::{CoordinateSystem, Place, Unit};
-use surfel_core::math::{Aabb, DVec3, Vec3};
+use std::collections::BTreeMap;
+use surfel_core::math::{Aabb, DVec3, Vec3, quantile};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_formats::{FileInfo, LasProfile};
@@ -10,6 +11,11 @@ use surfel_formats::{FileInfo, LasProfile};
 const MAX_DEGREES: f64 = 2.0;
 /// Minimum height in metres of a scan in degrees, as a multiple of its extent: 1 km is 0.01 degrees wide.
 const MIN_NEEDLE_RATIO: f64 = 100.0;
+/// Minimum height as such a multiple of a scan that may stand upright: a pole in metres is less high, if not a wire.
+const MIN_UPRIGHT_RATIO: f64 = 1000.0;
+/// Minimum ratio of the interquartile range of the heights above a place to the height of all, at which a scan stands
+/// upright. It is a half for a pole; land is flat or sloping.
+const MIN_UPRIGHT_RANGE: f64 = 0.35;
 /// Minimum ratio of the distance from longitude and latitude zero to the extent of a scan. Coordinates of objects start
 /// near zero.
 const MIN_OFFSET_RATIO: f64 = 100.0;
@@ -42,7 +48,7 @@ fn metres_from_degrees(
 ) -> Option<String> {
     let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
     let extent = Extent::of(cloud);
-    if !extent.is_in_degrees(source.as_ref()) {
+    if !extent.is_in_degrees(cloud, source.as_ref()) {
         return None;
     }
     let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
@@ -89,7 +95,7 @@ fn metres_from_degrees(
 /// Returns true if the coordinates of a cloud are degrees: its `system` is geographic, or it has none and they look like
 /// degrees beside heights in metres.
 pub fn is_in_degrees(cloud: &PointCloud, system: Option<&str>) -> bool {
-    Extent::of(cloud).is_in_degrees(system.and_then(CoordinateSystem::parse).as_ref())
+    Extent::of(cloud).is_in_degrees(cloud, system.and_then(CoordinateSystem::parse).as_ref())
 }
 
 /// The least and greatest coordinates of a cloud.
@@ -105,9 +111,9 @@ impl Extent {
         Self { low, high }
     }
 
-    fn is_in_degrees(&self, system: Option<&CoordinateSystem>) -> bool {
+    fn is_in_degrees(&self, cloud: &PointCloud, system: Option<&CoordinateSystem>) -> bool {
         let is_stated = system.map(|system| system.unit() == Unit::Degrees);
-        self.is_on_earth() && is_stated.unwrap_or_else(|| self.is_needle())
+        self.is_on_earth() && is_stated.unwrap_or_else(|| self.is_needle(cloud))
     }
 
     /// Returns false for a cloud without points, too.
@@ -117,8 +123,8 @@ impl Extent {
         is_longitude && -90.0 <= low.y && high.y <= 90.0
     }
 
-    /// True if a scan is far higher than wide, and far from zero.
-    fn is_needle(&self) -> bool {
+    /// True if a scan is far higher than wide, as land is in degrees but not a pole in metres, and far from zero.
+    fn is_needle(&self, cloud: &PointCloud) -> bool {
         let size = self.high - self.low;
         let side = size.x.max(size.y);
         let offset = self.low.x.abs().max(self.low.y.abs());
@@ -126,6 +132,32 @@ impl Extent {
             && side < MAX_DEGREES
             && MIN_NEEDLE_RATIO * side < size.z
             && MIN_OFFSET_RATIO * side < offset
+            && (MIN_UPRIGHT_RATIO * side < size.z || !self.stands_upright(cloud))
+    }
+
+    /// True if there are points at all heights above most places of a scan.
+    fn stands_upright(&self, cloud: &PointCloud) -> bool {
+        const MAX_SAMPLES: usize = 10_000;
+        const MAX_CELLS: f64 = 8.0;
+        let step = cloud.len().div_ceil(MAX_SAMPLES).max(1);
+        let sample = (0..cloud.len()).step_by(step).map(|i| cloud.world_position(i));
+        let sample: Vec<DVec3> = sample.filter(|position| position.is_finite()).collect();
+        let n_cells = (sample.len() as f64 / 16.0).sqrt().clamp(1.0, MAX_CELLS).floor();
+        let size = self.high - self.low;
+        let cell = |position: &DVec3| {
+            let at = n_cells * (*position - self.low) / size.max(DVec3::splat(f64::MIN_POSITIVE));
+            [at.x, at.y].map(|along| along.min(n_cells - 1.0) as u8)
+        };
+        let mut heights: BTreeMap<[u8; 2], Vec<f64>> = BTreeMap::new();
+        sample.iter().for_each(|at| heights.entry(cell(at)).or_default().push(at.z));
+        let range = |heights: &Vec<f64>| {
+            let quartile = |fraction| quantile(heights.iter().copied(), fraction);
+            let range =
+                quartile(0.75).zip(quartile(0.25)).map_or(0.0, |(upper, lower)| upper - lower);
+            range * heights.len() as f64
+        };
+        let mean = heights.values().map(range).sum::<f64>() / sample.len().max(1) as f64;
+        MIN_UPRIGHT_RANGE * size.z < mean
     }
 }
 
@@ -220,6 +252,33 @@ mod tests {
             assert_eq!(metres_from_degrees(&mut cloud, &mut info, None), None);
             assert!(cloud == before);
         }
+    }
+
+    #[test]
+    fn poles_are_no_land() {
+        let random = |i: u32, salt: f64| (f64::from(i) * salt).fract();
+        let cloud = |position: &dyn Fn(u32) -> DVec3| {
+            let positions = (0..3000).map(|i| position(i).as_vec3()).collect();
+            PointCloud {
+                origin: DVec3::new(10.0, 5.0, 0.0),
+                ..PointCloud::from_positions(positions)
+            }
+        };
+        let pole = cloud(&|i| {
+            let (sin, cos) = (std::f64::consts::TAU * random(i, 0.618_034)).sin_cos();
+            DVec3::new(0.025 * cos, 0.025 * sin, 6.0 * random(i, 0.754_878))
+        });
+        assert!(!is_in_degrees(&pole, None));
+        // A plain that slopes by 6 m, and one with houses, both 5.5 km wide.
+        let [slope, town] = [false, true].map(|has_houses| {
+            cloud(&|i| {
+                let (x, y) = (random(i, 0.618_034), random(i, 0.754_878));
+                let house =
+                    if random(i, 0.569_84) < 0.2 { 6.0 * random(i, 0.414_214) } else { 0.0 };
+                DVec3::new(0.05 * x, 0.05 * y, if has_houses { house } else { 6.0 * x })
+            })
+        });
+        assert!(is_in_degrees(&slope, None) && is_in_degrees(&town, None));
     }
 
     #[test]
