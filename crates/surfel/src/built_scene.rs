@@ -161,10 +161,8 @@ impl BuiltScene {
     /// Returns the index that a point of an instance had when it was read.
     pub(crate) fn source_index(&self, instance: usize, point: u32) -> Option<u32> {
         let instance = self.flat.instances.get(instance)?;
-        let node = self.graph.nodes.get(instance.node_idx as usize)?;
-        let is_shown = |material: usize| material == instance.material_idx as usize;
-        let primitive = node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
-        self.source_indices.get(primitive.geometry)?.get(point as usize).copied()
+        let sources = self.source_indices.get(instance.graph_geometry_idx as usize)?;
+        sources.get(point as usize).copied()
     }
 
     /// Moves everything to a time in seconds, forward or back.

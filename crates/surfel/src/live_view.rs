@@ -102,13 +102,9 @@ impl LiveView {
 
     /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
     pub fn sources(&self) -> Vec<&[u32]> {
-        let source = |instance: &Instance| {
-            let node = self.trees.graph.nodes.get(instance.node_idx as usize)?;
-            let is_shown = |material: usize| material == instance.material_idx as usize;
-            let primitive =
-                node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
-            Some(&self.trees.source_indices.get(primitive.geometry)?[..])
-        };
-        self.flat.instances.iter().map(|instance| source(instance).unwrap_or_default()).collect()
+        let sources = &self.trees.source_indices;
+        let source = |instance: &Instance| sources.get(instance.graph_geometry_idx as usize);
+        let sources = self.flat.instances.iter().map(source);
+        sources.map(|source| source.map_or(&[][..], Vec::as_slice)).collect()
     }
 }

@@ -32,11 +32,8 @@ pub fn describe(
         FlatGeometry::Cloud(_) => json!("point"),
         FlatGeometry::Mesh(_) => json!("triangle"),
     };
-    let node = &graph.nodes[instance.node_idx as usize];
     facts["object"] = json!(name(graph, instance.node_idx as usize));
-    let is_shown = |material: usize| material == instance.material_idx as usize;
-    let primitive = node.primitives.iter().find(|primitive| is_shown(primitive.material));
-    let Some(geometry) = primitive.map(|primitive| primitive.geometry) else { return facts };
+    let geometry = instance.graph_geometry_idx as usize;
     let index = trees.source_indices[geometry].get(picked.primitive_idx as usize);
     let source = loaded.graph.geometries.get(geometry).zip(index);
     let Some((Geometry::Points(cloud), &index)) = source else { return facts };

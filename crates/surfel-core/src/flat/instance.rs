@@ -26,6 +26,8 @@ pub struct Instance {
     pub material_idx: u32,
     /// Index of the node in the graph.
     pub node_idx: u32,
+    /// Index of the geometry in the graph, of which the flat scene has another for each node that deforms it.
+    pub graph_geometry_idx: u32,
     /// True if light can pass through the material.
     pub is_transmissive: bool,
     /// True if the geometry is Gaussians, which emit light and have no surface.
@@ -69,6 +71,7 @@ impl Instance {
             geometry_idx: 0,
             material_idx: 0,
             node_idx: 0,
+            graph_geometry_idx: 0,
             is_transmissive: false,
             is_gaussian: false,
         })

@@ -272,6 +272,7 @@ impl FlatScene {
                     geometry_idx,
                     material_idx: part.material as u32,
                     node_idx: node_idx as u32,
+                    graph_geometry_idx: part.geometry as u32,
                     is_transmissive,
                     is_gaussian,
                     ..instance

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::description::ObjectDescription;
-use crate::memory_files::MemoryContent;
+use crate::memory_files::{FileContent, MemoryContent};
 use crate::resolve::resolve;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
@@ -12,7 +12,8 @@ use surfel_core::math::Random;
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, Subsample};
 use surfel_core::progress::NoProgress;
-use surfel_formats::SaveOptions;
+use surfel_core::scene::{Geometry, Graph, Material, Primitive};
+use surfel_formats::{FileInfo, SaveOptions};
 
 /// Holds up the threads of a picture at the end of their first tile.
 #[derive(Default)]
@@ -169,4 +170,25 @@ fn threads_of_pictures_have_the_lowest_priority() {
     };
     assert_eq!(scene.picture_threads().unwrap().install(niceness), 19);
     assert_eq!(scene.preparation_threads.install(niceness), niceness());
+}
+
+#[test]
+fn points_of_several_clouds_of_one_material_have_their_own_indices() {
+    let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+    let whole = PointCloud::from_positions((0..400).map(corner).collect());
+    // The first points of the first cloud are nowhere.
+    let mut broken = whole.clone();
+    broken.positions[..5].fill(Vec3::NAN);
+    let mut graph = Graph::from_geometry(Geometry::Points(broken), Material::MATTE);
+    graph.geometries.push(Geometry::Points(whole));
+    graph.nodes[0].primitives.push(Primitive { geometry: 1, material: 0 });
+    let mut description = SceneDescription::of_files(["memory:two"]);
+    let content = MemoryContent::File(Arc::new(FileContent { graph, info: FileInfo::default() }));
+    description.memory.insert("memory:two", content);
+    let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
+    let view = scene.view(&description, &NoProgress).unwrap();
+    assert_eq!(view.sources().iter().map(|source| source[0]).collect::<Vec<u32>>(), [5, 0]);
+    let resolved = resolve(&description, &NoProgress).unwrap();
+    let built = resolved.build_trees(&NoProgress).unwrap();
+    assert_eq!([0, 1].map(|instance| built.source_index(instance, 0)), [Some(5), Some(0)]);
 }
