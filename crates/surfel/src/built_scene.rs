@@ -94,6 +94,18 @@ impl Resolved {
     }
 }
 
+/// Turns everything in front of the camera about `up`, under lights that stay. Of a `room`, the walls before the camera are
+/// hidden.
+pub(crate) fn turn(flat: &mut FlatScene, up: Vec3, room: Option<&Room>, turn_rad: f64) {
+    // Camera and lights go round together: turning everything else would move every tree.
+    let turn = DQuat::from_axis_angle(up.as_dvec3(), turn_rad);
+    let center = (flat.camera.focal_point - flat.origin).as_vec3();
+    flat.camera = flat.camera.rotated_about_focal_point(turn);
+    flat.camera_planes = planes_before(room, &flat.camera);
+    flat.lights.iter_mut().for_each(|light| *light = light.rotated(turn));
+    flat.punctual_lights.iter_mut().for_each(|lamp| *lamp = lamp.rotated_about(turn, center));
+}
+
 /// Returns the planes that hide from a camera the walls of a room that it looks through.
 pub(crate) fn planes_before(room: Option<&Room>, camera: &Camera) -> Vec<ClipPlane> {
     room.map_or(Vec::new(), |room| room.planes_before(camera))
@@ -196,15 +208,9 @@ impl BuiltScene {
 
     /// Turns everything in front of the camera, under lights that stay, from where the last [`BuiltScene::seek`] left it.
     pub fn turn(&mut self, turn_rad: f64) {
-        // Camera and lights go round together: turning everything else would move every tree.
-        let turn = DQuat::from_axis_angle(self.up.as_dvec3(), turn_rad);
-        let camera = self.flat.camera;
-        let center = (camera.focal_point - self.flat.origin).as_vec3();
-        self.flat.camera = camera.rotated_about_focal_point(turn);
-        self.flat.camera_planes = planes_before(self.turned_room.as_ref(), &self.flat.camera);
-        self.flat.lights = self.lights.iter().map(|light| light.rotated(turn)).collect();
-        let lamps = self.lamps.iter().map(|lamp| lamp.rotated_about(turn, center));
-        self.flat.punctual_lights = lamps.collect();
+        self.flat.lights.clone_from(&self.lights);
+        self.flat.punctual_lights.clone_from(&self.lamps);
+        turn(&mut self.flat, self.up, self.turned_room.as_ref(), turn_rad);
     }
 
     /// Returns where the pixels of the picture lie, if the camera looks straight down without perspective.

@@ -1,6 +1,7 @@
 //! Movies of a live scene, whose files are not read again.
 
 use crate::animate::{frame_count, movie_options};
+use crate::built_scene::turn;
 use crate::description::SceneDescription;
 use crate::error::{Error, Result};
 use crate::live_scene::LiveScene;
@@ -8,7 +9,9 @@ use crate::live_view::LiveView;
 use crate::picture::image_options;
 use crate::progress_log::CancelOnly;
 use crate::resolve::camera_motion;
+use std::f64::consts::TAU;
 use std::path::Path;
+use surfel_core::flat::FlatScene;
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::scene::Camera;
@@ -44,13 +47,21 @@ pub fn film(
     let options = MovieOptions { n_frames, image, ..movie_options(description) };
     let mut movie = Movie::open(output, &options, false)?;
     let moves_objects = 0.0 < scene.loaded().duration_secs();
+    let FlatScene { camera, lights, punctual_lights, .. } = &view.flat;
+    let (camera, lights, lamps) = (*camera, lights.clone(), punctual_lights.clone());
     progress.begin("film", u64::from(n_frames));
     for frame in 0..n_frames {
         let time_secs = f64::from(frame) / options.fps;
         if moves_objects {
             view = view_at(scene, description, time_secs, &quiet)?;
         } else {
-            view.flat.camera = camera_at(&view, description, time_secs)?;
+            view.flat.camera = camera_at(camera, &view, description, time_secs)?;
+            view.flat.lights.clone_from(&lights);
+            view.flat.punctual_lights.clone_from(&lamps);
+        }
+        if let Some(seconds) = description.output.turntable {
+            let (up, room) = (up_of(&view), view.turned_room.as_ref());
+            turn(&mut view.flat, up, room, TAU * time_secs / seconds);
         }
         let mut picture = scene.render(&view, &quiet)?;
         let mut overlay = view.overlay();
@@ -75,10 +86,52 @@ fn view_at(
     scene.view(&at, progress)
 }
 
-/// The camera of a view at another time, if nothing else moves.
-fn camera_at(view: &LiveView, description: &SceneDescription, time_secs: f64) -> Result<Camera> {
-    let camera = view.flat.camera;
-    let up = view.description.world.up.unwrap_or(Vec3::Z);
+/// The first camera of a view at another time, if nothing else moves.
+fn camera_at(
+    first: Camera,
+    view: &LiveView,
+    description: &SceneDescription,
+    time_secs: f64,
+) -> Result<Camera> {
     let motion = camera_motion(description)?;
-    Ok(motion.map_or(camera, |motion| motion.at(time_secs, camera, up)))
+    Ok(motion.map_or(first, |motion| motion.at(time_secs, first, up_of(view))))
+}
+
+/// The up axis of a view, which its complete description has.
+fn up_of(view: &LiveView) -> Vec3 {
+    view.description.world.up.unwrap_or(Vec3::Z)
+}
+
+#[cfg(test)]
+mod tests {
+    //! The frames of films.
+
+    use super::*;
+    use crate::animate::PlannedMovie;
+    use crate::live_scene::UseCase;
+    use crate::memory_files::MemoryContent;
+    use std::sync::Arc;
+    use surfel_core::points::PointCloud;
+    use surfel_core::progress::NoProgress;
+
+    #[test]
+    fn a_film_of_a_turntable_has_the_frames_of_its_animation() {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, (i % 3) as f32);
+        let cloud = PointCloud::from_positions((0..400).map(corner).collect());
+        let mut description = SceneDescription::of_files(["memory:corner"]);
+        description.memory.insert("memory:corner", MemoryContent::Points(Arc::new(cloud), None));
+        (description.output.turntable, description.output.fps) = (Some(4.0), Some(1.0));
+        description.picture.resolution = Some((64, 36));
+        (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
+        let name = |part: &str| format!("surfel-film-{part}-{}.gif", std::process::id());
+        let [filmed, animated] =
+            ["filmed", "animated"].map(|part| std::env::temp_dir().join(name(part)));
+        let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
+        assert_eq!(film(&scene, &description, &filmed, &NoProgress).unwrap(), 4);
+        let movie = PlannedMovie::new(&description, &NoProgress).unwrap();
+        movie.render(&animated, false, &NoProgress).unwrap();
+        let [of_film, of_animation] = [&filmed, &animated].map(|path| std::fs::read(path).unwrap());
+        [filmed, animated].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+        assert!(of_film == of_animation);
+    }
 }

@@ -297,6 +297,7 @@ impl LiveScene {
             moves_camera,
             unit,
             trees,
+            turned_room: auto.turned_room,
         })
     }
 

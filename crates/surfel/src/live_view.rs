@@ -12,8 +12,8 @@ use surfel_core::flat::{FlatScene, Instance};
 use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::Vec3;
 use surfel_core::render::Settings;
-use surfel_core::scene::Graph;
 use surfel_core::scene::color::{ColorSource, Legend};
+use surfel_core::scene::{Graph, Room};
 use surfel_core::trace::Simd;
 use surfel_formats::Georeference;
 
@@ -47,6 +47,8 @@ pub struct LiveView {
     pub moves_camera: bool,
     /// Unit of the coordinates.
     pub(crate) unit: Unit,
+    /// The room on a turntable, whose walls before the camera are hidden.
+    pub turned_room: Option<Room>,
     /// The trees, which several views share.
     pub trees: Arc<SceneTrees>,
 }
