@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
 use crate::names::list_files;
 use crate::progress_log::NotesAsChoices;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use surfel_core::math::Vec3;
+use surfel_core::math::{DAffine3, Vec3};
 use surfel_core::points::neighbors::Neighborhood;
 use surfel_core::points::{
     PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, STRUCTURE,
@@ -118,11 +119,17 @@ fn import_from_memory(
     options: &ImportOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
-    let keep = |cloud| match options.keeps_all_columns {
-        true => Ok(cloud),
-        false => filter_cloud(cloud, &settings.preparation, progress),
-    };
-    Ok((content.to_graph().try_map_clouds(keep)?, content.info()))
+    let mut graph = content.to_graph();
+    if !options.keeps_all_columns {
+        let file_from_geometries = graph.world_from_geometries();
+        for (geometry, file_from_cloud) in graph.geometries.iter_mut().zip(&file_from_geometries) {
+            if let Geometry::Points(cloud) = geometry {
+                let all = std::mem::take(cloud);
+                *cloud = filter_cloud(all, file_from_cloud, &settings.preparation, progress)?;
+            }
+        }
+    }
+    Ok((graph, content.info()))
 }
 
 /// A graph of one cloud.
@@ -145,38 +152,47 @@ pub fn into_cloud(
     }
 }
 
-/// Drops the points of a cloud that the settings do not keep.
+/// Drops the points of a cloud that the settings do not keep. Filters see the coordinates of the file.
 ///
 /// # Errors
 ///
 /// Fails, with the key at fault, if the cloud lacks a column of a filter, and if a filter keeps no point.
 pub fn filter_cloud(
     mut cloud: PointCloud,
+    file_from_cloud: &DAffine3,
     settings: &PreparationSettings,
     progress: &dyn Progress,
 ) -> Result<PointCloud, Invalid> {
     for (key, filter) in settings.point_filters()? {
         let n_points = cloud.len();
-        keep_matching(&mut cloud, key, &filter, progress)?;
+        let kept = matches(&in_file(&cloud, file_from_cloud), key, &filter)?;
+        keep(&mut cloud, &kept, &filter, progress);
         check_any_left(cloud.len(), n_points, key, &filter)?;
     }
     Ok(cloud)
 }
 
-/// Returns a copy of the points of a cloud that the settings keep. Nothing else of it is copied.
+/// Returns a copy of the points of a cloud that the settings keep. Nothing else of it is copied. Filters see the coordinates
+/// of the file.
 ///
 /// # Errors
 ///
 /// Fails as [`filter_cloud`] does.
 pub fn filtered_copy(
     cloud: &PointCloud,
+    file_from_cloud: &DAffine3,
     settings: &PreparationSettings,
     progress: &dyn Progress,
 ) -> Result<PointCloud, Invalid> {
     let mut kept: Vec<u32> = (0..cloud.len() as u32).collect();
-    for (key, filter) in settings.point_filters()? {
+    let filters = settings.point_filters()?;
+    if filters.is_empty() {
+        return Ok(cloud.clone());
+    }
+    let in_file = in_file(cloud, file_from_cloud);
+    for (key, filter) in filters {
         let n_points = kept.len();
-        let matches = matches(cloud, key, &filter)?;
+        let matches = matches(&in_file, key, &filter)?;
         kept.retain(|i| matches[*i as usize]);
         let points = counted(n_points, "point");
         progress.note(&format!("{} of {points} meet {}", kept.len(), filter.describe()));
@@ -200,6 +216,21 @@ fn check_any_left(
     }
 }
 
+/// Returns a cloud in the coordinates of its file: those of a node may be others.
+fn in_file<'c>(cloud: &'c PointCloud, file_from_cloud: &DAffine3) -> Cow<'c, PointCloud> {
+    if *file_from_cloud == DAffine3::IDENTITY {
+        return Cow::Borrowed(cloud);
+    }
+    let mut moved = cloud.clone();
+    let matrix = file_from_cloud.matrix3;
+    moved.origin = file_from_cloud.transform_point3(cloud.origin);
+    moved.positions.iter_mut().for_each(|p| *p = (matrix * p.as_dvec3()).as_vec3());
+    let of_normals = matrix.inverse().transpose();
+    let turned = |normal: &Vec3| (of_normals * normal.as_dvec3()).normalize_or_zero().as_vec3();
+    moved.normals.iter_mut().flatten().for_each(|normal| *normal = turned(normal));
+    Cow::Owned(moved)
+}
+
 fn matches(cloud: &PointCloud, key: &str, filter: &PointFilter) -> Result<Vec<bool>, Invalid> {
     filter.matches(cloud, 0).map_err(|error| Invalid::at(key, with_nearest(&error)))
 }
@@ -211,11 +242,17 @@ pub(crate) fn keep_matching(
     filter: &PointFilter,
     progress: &dyn Progress,
 ) -> Result<(), Invalid> {
+    let kept = matches(cloud, key, filter)?;
+    keep(cloud, &kept, filter, progress);
+    Ok(())
+}
+
+/// Drops the points for which `kept` is false, and reports how many stay.
+fn keep(cloud: &mut PointCloud, kept: &[bool], filter: &PointFilter, progress: &dyn Progress) {
     let n_points = cloud.len();
-    cloud.retain_from(0, &matches(cloud, key, filter)?);
+    cloud.retain_from(0, kept);
     let points = counted(n_points, "point");
     progress.note(&format!("{} of {points} meet {}", cloud.len(), filter.describe()));
-    Ok(())
 }
 
 /// Reports the filter of settings with which files gave no point.

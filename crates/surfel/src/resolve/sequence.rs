@@ -182,7 +182,7 @@ impl Sequence {
         }
         let settings = &self.settings.preparation;
         cloud.source_indices = Some((0..cloud.len() as u32).collect());
-        let mut cloud = filter_cloud(cloud, settings, progress)?;
+        let mut cloud = filter_cloud(cloud, &DAffine3::IDENTITY, settings, progress)?;
         settings.drop_estimated(&mut cloud);
         Ok(cloud)
     }

@@ -385,7 +385,10 @@ impl LoadedScene {
         let settings = self.settings_of(geometry, description);
         let cloud = match self.is_filtered {
             true => cloud,
-            false => filter_cloud(cloud, &settings.preparation, progress)?,
+            false => {
+                let file_from_cloud = self.file_from_geometry(geometry);
+                filter_cloud(cloud, &file_from_cloud, &settings.preparation, progress)?
+            }
         };
         if cloud.is_empty() {
             check_empty(self.files_of(geometry, description), &settings.preparation)?;
