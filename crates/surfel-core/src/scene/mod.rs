@@ -1,5 +1,6 @@
 //! Scenes: a graph of geometry with its materials, lights and animation, a background and a camera.
 
+mod sample;
 mod ground;
 mod camera;
 mod camera_fit;

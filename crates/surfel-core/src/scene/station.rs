@@ -5,6 +5,7 @@ use super::direction_cells::{
 };
 use super::ground::direction;
 use super::inside_view::InsideView;
+use super::sample;
 use crate::math::{Aabb, DVec3, Vec3, quantile};
 use crate::points::{PointCloud, is_camera_frame, is_in_camera_view, is_valid_position};
 use std::f32::consts::TAU;
@@ -51,7 +52,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
         _ => DVec3::ZERO,
     };
     let scanner = (position - cloud.origin).as_vec3();
-    let points = sample(cloud);
+    let points = valid_sample(cloud);
     let bounds = Aabb::of_points(points.iter().copied());
     let is_within = bounds.min.cmplt(scanner).all() && scanner.cmplt(bounds.max).all();
     if !is_within || points.len() < MIN_POINTS {
@@ -97,7 +98,7 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
 /// up, or `None` if its points are not those that such a camera measured.
 pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let zero = (-cloud.origin).as_vec3();
-    let offsets: Vec<Vec3> = sample(cloud).into_iter().map(|point| point - zero).collect();
+    let offsets: Vec<Vec3> = valid_sample(cloud).into_iter().map(|point| point - zero).collect();
     if up != Vec3::NEG_Y || offsets.len() < MIN_POINTS || !is_camera_frame(&offsets) {
         return None;
     }
@@ -116,20 +117,14 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
 }
 
 /// Returns the valid ones of points at about equal steps.
-fn sample(cloud: &PointCloud) -> Vec<Vec3> {
+fn valid_sample(cloud: &PointCloud) -> Vec<Vec3> {
     sample_indices(cloud).map(|i| cloud.positions[i]).collect()
 }
 
-/// Returns the indices of valid points at about equal steps. The steps vary a little, so that they do not follow the
-/// rings or columns in which scanners order their points.
+/// Returns the indices of valid points at about equal steps.
 fn sample_indices(cloud: &PointCloud) -> impl Iterator<Item = usize> {
-    let step = cloud.len().div_ceil(MAX_SAMPLES).max(1);
-    let starts = (0..cloud.len()).step_by(step).enumerate();
-    let jittered = starts.map(move |(i, start)| {
-        let golden = (i as u32).wrapping_mul(0x9e37_79b9);
-        start + ((u64::from(golden) * step as u64) >> 32) as usize
-    });
-    jittered.filter(|i| cloud.positions.get(*i).copied().is_some_and(is_valid_position))
+    let is_valid = |i: &usize| is_valid_position(cloud.positions[*i]);
+    sample::sample_indices(cloud.len(), MAX_SAMPLES).filter(is_valid)
 }
 
 /// Returns the 10th, 50th and 90th percentile of the distances.
@@ -405,7 +400,7 @@ mod tests {
     fn a_long_cloud_is_sampled_over_its_length() {
         let n = 5 * MAX_SAMPLES + 1;
         let cloud = PointCloud::from_positions((0..n).map(|i| Vec3::X * i as f32).collect());
-        let points = sample(&cloud);
+        let points = valid_sample(&cloud);
         assert!(points.len() <= MAX_SAMPLES && points.is_sorted_by(|a, b| a.x < b.x));
         assert!((0.99 * n as f32) < points[points.len() - 1].x);
     }

@@ -3,6 +3,7 @@
 
 use super::direction_cells::{PolarPoint, cells, polar_points};
 use super::ground::ground_axes;
+use super::sample::sample_points;
 use crate::math::{Vec3, median};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,6 +12,8 @@ use std::ops::Range;
 const CELL_DEG: f32 = 3.0;
 /// Angle of the view to either side of its middle, seen from above: that of a picture of 16:9.
 const HALF_VIEW_DEG: f32 = 50.0;
+/// Maximum number of points that are looked at: enough for some 50 in each cell of directions.
+const MAX_SAMPLES: usize = 400_000;
 /// Maximum number of points whose way to the sun is followed.
 const MAX_POINTS: usize = 5000;
 /// Length of the first step toward the sun, as a fraction of the point's distance, and the ratio of each step's end to
@@ -29,7 +32,8 @@ const PASSED_RATIO: Range<f32> = 1.1..1.5;
 /// `station` is the scanner's position among `points`, `ahead` the horizontal direction of the view, and `to_sun` the
 /// direction to the sun.
 pub fn sunlit_fraction(points: &[Vec3], station: Vec3, ahead: Vec3, to_sun: Vec3, up: Vec3) -> f64 {
-    let distances = median_distances(&polar_points(station, points, up));
+    let points = sample_points(points, MAX_SAMPLES);
+    let distances = median_distances(&polar_points(station, &points, up));
     let offsets = points.iter().map(|point| *point - station);
     let is_in_view = |offset: &Vec3| {
         let level = offset.reject_from_normalized(up);

@@ -2,15 +2,18 @@
 
 use super::camera::{Camera, Projection};
 use super::depth_map::DepthMap;
+use super::sample::sample_points;
 use crate::math::Vec3;
 
 /// Width over height of the map: that of a picture.
 const ASPECT: f64 = 16.0 / 9.0;
+/// Maximum number of points that are looked at: enough for the largest map.
+const MAX_SAMPLES: usize = 400_000;
 
 /// Returns the unit normals, facing `camera`, of the surface that `points` show it: one for each pixel of a small picture
 /// whose neighbours show points, too. The camera is in the coordinates of the points.
 pub fn visible_normals(points: &[Vec3], camera: &Camera) -> Vec<Vec3> {
-    let map = DepthMap::new(points, camera, ASPECT);
+    let map = DepthMap::new(&sample_points(points, MAX_SAMPLES), camera, ASPECT);
     let [_, _, forward] = camera.axes();
     let toward_camera = |point: Vec3| match camera.projection {
         Projection::Orthographic { .. } => -forward.as_vec3(),

@@ -1,9 +1,11 @@
 //! The automatic choice of a source of colours: one that shows the surface, not noise.
 
 use super::source::ColorSource;
-use crate::math::{Aabb, Random, Vec3};
+use crate::math::{Random, Vec3};
 use crate::points::PointCloud;
 use crate::points::neighbors::nearest_by_brute_force;
+use crate::scene::inlier_bounds;
+use crate::scene::sample::sample_indices;
 use rayon::prelude::*;
 
 /// sRGB-encoded colour of clouds without colours: light stone, for white objects glare and a cold grey looks
@@ -50,12 +52,14 @@ fn is_georeferenced_land(cloud: &PointCloud) -> bool {
     if cloud.origin.abs().max_element() < MIN_MAP_COORDINATE {
         return false;
     }
-    let size = Aabb::of_points(cloud.positions.iter().copied()).size();
+    let size = inlier_bounds(cloud).size();
     MIN_WIDTH_PER_HEIGHT * size.z <= size.x.min(size.y)
 }
 
 /// Number of patches that are examined.
 const N_PATCHES: usize = 64;
+/// Maximum number of points in which patches are sought.
+const MAX_SAMPLES: usize = 500_000;
 /// Number of points in a patch.
 const PATCH_SIZE: usize = 24;
 /// Minimum intraclass correlation of the patches. It is 0.76 in a laser scan of a pump, and 0.11 in the
@@ -70,6 +74,8 @@ fn shows_surface(positions: &[Vec3], values: &[f32]) -> bool {
     if positions.is_empty() {
         return false;
     }
+    let indices: Vec<usize> = sample_indices(positions.len(), MAX_SAMPLES).collect();
+    let positions: Vec<Vec3> = indices.iter().map(|i| positions[*i]).collect();
     // Equal steps could fall in with the regular pattern of a scan, random ones cannot.
     let mut random = Random::new(0, 0);
     let centers: Vec<usize> =
@@ -77,9 +83,9 @@ fn shows_surface(positions: &[Vec3], values: &[f32]) -> bool {
     let patches: Vec<(f64, f64)> = centers
         .into_par_iter()
         .map(|center| {
-            let neighbors = nearest_by_brute_force(positions, center, PATCH_SIZE - 1);
+            let neighbors = nearest_by_brute_force(&positions, center, PATCH_SIZE - 1);
             let others = neighbors.iter().map(|neighbor| neighbor.index as usize);
-            mean_and_variance(others.chain([center]).map(|i| f64::from(values[i])))
+            mean_and_variance(others.chain([center]).map(|i| f64::from(values[indices[i]])))
         })
         .filter(|(mean, variance)| mean.is_finite() && variance.is_finite())
         .collect();
@@ -142,7 +148,11 @@ mod tests {
         cloud.intensity = Some((0..2500).map(|i| ((i % 50) / 10 % 2) as f32).collect());
         cloud.origin = DVec3::new(562_000.0, 4_183_000.0, 150.0);
         assert_eq!(choose_source(&cloud).0, ColorSource::Elevation);
-        cloud.positions[0].z = 40.0;
+        // One stray point makes no land steep.
+        cloud.positions[0].z = 4000.0;
+        assert_eq!(choose_source(&cloud).0, ColorSource::Elevation);
+        let is_tower = |i: usize| i % 50 == 7;
+        (0..2500).filter(|i| is_tower(*i)).for_each(|i| cloud.positions[i].z = 40.0);
         assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
         cloud.colors = Some(vec![[0x8080; 3]; 2500]);
         assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
