@@ -4,7 +4,7 @@ use super::auto_viewpoint::automatic_direction;
 use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
 use super::ground::{direction, ground_axes};
-use super::inliers::{range_along, sample_inliers, without_fringe};
+use super::inliers::{range_along, sample_inliers, sample_middle};
 use super::turntable::fit_turntable;
 use crate::math::{DVec3, Vec3};
 use crate::points::PointCloud;
@@ -12,11 +12,12 @@ use crate::points::PointCloud;
 /// Radius of a point without neighbours and without a radius of its own, as the preparation gives it.
 const LONE_RADIUS: f32 = 1.0;
 
-/// Returns a camera that shows all of `cloud` but its outliers and a thin fringe far away from its middle.
+/// Returns a camera that shows all of `cloud` but its outliers and a thin fringe far away from its middle, of each part
+/// of a sampled scene for itself.
 pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
     let radius = cloud.radii.as_ref().and_then(|radii| radii.first().copied());
     let radius = radius.filter(|radius| 0.0 < *radius && radius.is_finite());
-    let points = with_extent(without_fringe(sample_inliers(cloud)), radius.unwrap_or(LONE_RADIUS));
+    let points = with_extent(sample_middle(cloud), radius.unwrap_or(LONE_RADIUS));
     let direction = fit.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, fit));
     let camera = match fit.is_turntable {
@@ -115,6 +116,31 @@ mod tests {
         for corner in corners {
             let (x, y, _) = view.project(corner).unwrap();
             assert!((0.0..1600.0).contains(&x) && (0.0..900.0).contains(&y), "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn a_second_cloud_of_few_points_is_no_outlier_of_the_first() {
+        let mut random = Random::new(5, 0);
+        let mut cube = |n: usize, size: f32, center: Vec3| -> Vec<Vec3> {
+            let mut axis = || random.next_f32() - 0.5;
+            (0..n).map(|_| size * Vec3::new(axis(), axis(), axis()) + center).collect()
+        };
+        let building = cube(30_000, 2.0, Vec3::ZERO);
+        for (n_points, distance) in [(600, 3.5), (100, 40.0), (1, 5.0)] {
+            let statue = cube(n_points, 1.0, distance * Vec3::X);
+            let cloud = |points: &[Vec3]| {
+                let geometry = Geometry::Points(PointCloud::from_positions(points.to_vec()));
+                Graph::from_geometry(geometry, Material::default())
+            };
+            let mut graph = cloud(&building);
+            graph.append(cloud(&statue));
+            let camera = fit_camera(&graph.sample_points(), &CameraFit::default());
+            let view = camera.view(DVec3::ZERO, 1600, 900);
+            for point in statue.iter().chain(&building) {
+                let (x, y, _) = view.project(*point).unwrap();
+                assert!((0.0..1600.0).contains(&x) && (0.0..900.0).contains(&y), "{x} {y}");
+            }
         }
     }
 

@@ -3,12 +3,13 @@
 use super::animation::{Animation, Channel};
 use super::camera::{Camera, Projection};
 use super::cloud_geometry::CloudGeometry;
+use super::inliers::PART;
 use super::light::PunctualLight;
 use super::material::Material;
 use super::mesh::Mesh;
 use super::texture::Texture;
 use crate::math::{DAffine3, DQuat, DVec3, Vec3};
-use crate::points::{Morph, PointCloud, Skin};
+use crate::points::{Morph, PointCloud, Scalar, Skin, Values};
 
 /// A scene graph, of one file or of several. Indices refer to the columns of the graph.
 ///
@@ -305,9 +306,12 @@ impl<C: AsRef<PointCloud>> Graph<C> {
     }
 
     /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true. Beside clouds,
-    /// meshes of few vertices have points on their triangles, so that they do not count as outliers.
+    /// meshes of few vertices have points on their triangles, so that they do not count as outliers. Of several clouds, each
+    /// is a part of its own, as a column of the sample tells.
     pub fn sample_points_of(&self, is_chosen: &[bool]) -> PointCloud {
         const MAX_POINTS: usize = 400_000;
+        /// Number of points of each cloud that has so many, unless there are very many clouds.
+        const MIN_POINTS_OF_CLOUD: usize = 1000;
         /// Number of points on all meshes as a fraction of those of all clouds.
         const MESH_FRACTION: f64 = 0.25;
         let world = self.world_from_nodes();
@@ -325,20 +329,40 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         let (n_clouds, n_of_clouds) = (sizes.len(), sizes.iter().sum::<usize>());
         let n_meshes = instances.len() - n_clouds;
         let n_on_mesh = (MESH_FRACTION * (n_of_clouds / step) as f64) as usize / n_meshes.max(1);
-        let mut points = Vec::new();
+        let min_of_cloud = MIN_POINTS_OF_CLOUD.min(MAX_POINTS / n_clouds.max(1)).max(1);
+        let (mut points, mut parts, mut n_parts) = (Vec::new(), Vec::new(), 0i32);
         for (geometry, world) in instances {
             let origin = geometry.origin();
             let point = |p: &Vec3| world.transform_point3(origin + p.as_dvec3());
-            points.extend(geometry.positions().iter().step_by(step).map(point));
-            if let Geometry::Triangles(mesh) = geometry
-                && mesh.positions.len() < n_on_mesh
-            {
-                points.extend(points_on_triangles(mesh, n_on_mesh).iter().map(point));
+            let positions = geometry.positions();
+            match geometry {
+                Geometry::Points(cloud) => {
+                    let step = step.min((positions.len() / min_of_cloud).max(1));
+                    points.extend(positions.iter().step_by(step).map(point));
+                    // A cloud of several files has several parts.
+                    let part_of = cloud.as_ref().scalar(PART);
+                    let part = |i: usize| 1 + n_parts + part_of.map_or(0, |it| it.get(i) as i32);
+                    let first = parts.len();
+                    parts.extend((0..positions.len()).step_by(step).map(part));
+                    n_parts = parts[first..].iter().copied().fold(n_parts, i32::max);
+                }
+                Geometry::Triangles(mesh) => {
+                    points.extend(positions.iter().step_by(step).map(point));
+                    if mesh.positions.len() < n_on_mesh {
+                        points.extend(points_on_triangles(mesh, n_on_mesh).iter().map(point));
+                    }
+                    // All meshes are one part.
+                    parts.resize(points.len(), 0);
+                }
             }
         }
         let origin = PointCloud::choose_origin(&points);
         let positions = points.iter().map(|point| (*point - origin).as_vec3()).collect();
-        PointCloud { origin, ..PointCloud::from_positions(positions) }
+        let mut sample = PointCloud { origin, ..PointCloud::from_positions(positions) };
+        if 1 < n_parts {
+            sample.scalars.push(Scalar { name: PART.to_owned(), values: Values::I32(parts) });
+        }
+        sample
     }
 
     /// Returns the index of the first visible node with a camera, and that camera in world coordinates.

@@ -2,34 +2,56 @@
 
 use crate::math::{Aabb, Vec3, median};
 use crate::points::{PointCloud, is_valid_position};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 /// Fraction of points at each end of an axis that can be outliers.
 const OUTLIER_FRACTION: f64 = 0.005;
 /// Maximum number of points that are looked at.
 const MAX_SAMPLES: usize = 200_000;
 
+/// Name of the scalar column that tells which part of a sampled scene each point is of. A part is no outlier of the others,
+/// however few its points are. No file has a column of this name.
+pub const PART: &str = "surfel:part";
+
 /// Returns the bounds of all points but the outliers, relative to the cloud's origin.
 pub fn inlier_bounds(cloud: &PointCloud) -> Aabb {
     Aabb::of_points(sample_inliers(cloud))
 }
 
-/// Returns a sample of the points without outliers, relative to the cloud's origin; a single zero if the
+/// Returns a sample of the points without the outliers of each part, relative to the cloud's origin; a single zero if the
 /// cloud is empty.
 pub(super) fn sample_inliers(cloud: &PointCloud) -> Vec<Vec3> {
+    sample_parts(cloud).into_iter().flatten().collect()
+}
+
+/// Returns a sample of the points as [`sample_inliers`] does, also without a thin fringe of each part far away from its middle.
+pub(super) fn sample_middle(cloud: &PointCloud) -> Vec<Vec3> {
+    sample_parts(cloud).into_iter().flat_map(without_fringe).collect()
+}
+
+/// Returns a sample of the points of each part without its outliers.
+fn sample_parts(cloud: &PointCloud) -> Vec<Vec<Vec3>> {
     let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
-    let valid = cloud.positions.iter().step_by(stride).copied().filter(|p| is_valid_position(*p));
-    // A place counts once, however many points lie there.
-    let mut seen = HashSet::new();
-    let distinct = valid.filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
-    without_stray_groups(without_outliers(&distinct.collect::<Vec<Vec3>>()))
+    let part_of_point = cloud.scalar(PART);
+    let mut parts: BTreeMap<i64, Vec<Vec3>> = BTreeMap::new();
+    for i in (0..cloud.len()).step_by(stride).filter(|i| is_valid_position(cloud.positions[*i])) {
+        let part = part_of_point.map_or(0, |parts| parts.get(i) as i64);
+        parts.entry(part).or_default().push(cloud.positions[i]);
+    }
+    if parts.is_empty() {
+        return vec![vec![Vec3::ZERO]];
+    }
+    let without_strays = |points: Vec<Vec3>| {
+        // A place counts once, however many points lie there.
+        let mut seen = HashSet::new();
+        let distinct = points.into_iter().filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
+        without_stray_groups(without_outliers(&distinct.collect::<Vec<Vec3>>()))
+    };
+    parts.into_values().map(without_strays).collect()
 }
 
 /// Returns the points within the inner quantiles of all axes, widened by a quarter of their range.
 fn without_outliers(points: &[Vec3]) -> Vec<Vec3> {
-    if points.is_empty() {
-        return vec![Vec3::ZERO];
-    }
     let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
     for axis in 0..3 {
         let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
@@ -44,7 +66,7 @@ fn without_outliers(points: &[Vec3]) -> Vec<Vec3> {
 
 /// Returns the points about the middle of a cloud that thins out far away from it, as that of a scanner which stood among
 /// the things it scanned; all points of other clouds.
-pub(super) fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
+fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
     /// Fraction of the points that decide about the size of the middle.
     const CORE_FRACTION: f64 = 0.95;
     /// Distance to which points are kept, in distances of the core. Only farther points can be a fringe.

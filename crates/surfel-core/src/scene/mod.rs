@@ -44,7 +44,7 @@ pub use cloud_geometry::CloudGeometry;
 pub use environment::{Environment, EnvironmentArrays};
 pub use graph::{Geometry, Graph, Joint, Node, Primitive, Transform};
 pub use ground::north;
-pub use inliers::inlier_bounds;
+pub use inliers::{PART, inlier_bounds};
 pub use inside_view::InsideView;
 pub use interior::{Room, find_room};
 pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};
