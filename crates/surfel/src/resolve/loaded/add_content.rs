@@ -66,7 +66,9 @@ impl LoadedScene {
                 continue;
             }
             let preparation = &description.objects_default.preparation;
+            let ends = file_ends(&clouds);
             let graph = merged(clouds, &files, preparation, progress)?;
+            self.file_ends.insert(self.graph.geometries.len(), ends);
             let nodes = self.append(graph, None);
             self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
         }
@@ -176,6 +178,7 @@ impl LoadedScene {
             self.append_below(above, graph, owner);
         }
         if object.merge() {
+            self.file_ends.insert(self.graph.geometries.len(), file_ends(&merging));
             let graph = merged(merging, &object.files, &settings.preparation, progress)?;
             self.append_below(node, graph, owner);
         }
@@ -254,6 +257,16 @@ impl LoadedScene {
         let channels = motion.tracks.iter().map(|track| Channel { node, track: track.clone() });
         self.graph.animation.channels.extend(channels);
     }
+}
+
+/// Returns the number of points up to the end of each cloud, as they follow each other once they are one.
+fn file_ends(clouds: &[Loaded]) -> Vec<usize> {
+    let mut end = 0;
+    let ends = clouds.iter().map(|part| {
+        end += part.cloud.len();
+        end
+    });
+    ends.collect()
 }
 
 /// Clouds as one, whose points lie among each other.

@@ -53,6 +53,7 @@ impl LoadedScene {
             objects: self.objects.clone(),
             owners: self.owners.clone(),
             sequences: self.sequences.clone(),
+            file_ends: self.file_ends.clone(),
             keeps_all_columns: self.keeps_all_columns,
             is_filtered: true,
         })

@@ -3,6 +3,7 @@
 mod add_content;
 mod checks;
 mod filtered;
+mod shown_points;
 mod without_effect;
 
 pub(crate) use without_effect::report_unused_of_files;
@@ -15,7 +16,7 @@ use super::sequence::Sequence;
 use crate::description::{CameraMotion, Invalid, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::names::list_files;
-use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::iter::successors;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -50,6 +51,8 @@ pub struct LoadedScene {
     owners: Vec<Option<usize>>,
     /// Sequences whose files are read one by one.
     pub(super) sequences: Vec<Sequence>,
+    /// For each cloud of several files, by its geometry, the number of points up to the end of each file.
+    file_ends: BTreeMap<usize, Vec<usize>>,
     keeps_all_columns: bool,
     /// True if points that the description does not keep were dropped.
     is_filtered: bool,
@@ -115,6 +118,7 @@ impl LoadedScene {
             objects: Vec::new(),
             owners: Vec::new(),
             sequences: Vec::new(),
+            file_ends: BTreeMap::new(),
             keeps_all_columns: keep.all_columns,
             is_filtered: !keep.all_columns,
         };
@@ -244,30 +248,6 @@ impl LoadedScene {
         let objects = self.objects.iter().zip(&description.objects);
         let visible = objects.map(|(nodes, object)| (nodes.node, object.visible()));
         visible.filter(|(node, _)| !vanishes(*node)).collect()
-    }
-
-    /// Returns points that show where everything is that a description shows; where all of it is if it shows nothing.
-    pub(super) fn shown_points(&self, description: &SceneDescription) -> Cow<'_, PointCloud> {
-        let visibility = self.visibility(&self.graph, description);
-        if visibility.iter().all(|(node, shown)| self.graph.nodes[*node].is_visible == *shown) {
-            return self.sample_points();
-        }
-        let nodes = self.graph.nodes.clone();
-        let mut graph = Graph::<PointCloud> { nodes, ..Graph::default() };
-        for (node, is_visible) in visibility {
-            graph.nodes[node].is_visible = is_visible;
-        }
-        let shown = self.graph.sample_points_of(&graph.visible_nodes());
-        match shown.is_empty() {
-            true => Cow::Owned(self.graph.sample_points_of(&vec![true; graph.nodes.len()])),
-            false => Cow::Owned(shown),
-        }
-    }
-
-    /// Returns points that show where everything is.
-    pub fn sample_points(&self) -> Cow<'_, PointCloud> {
-        let single = self.single_cloud().map(Cow::Borrowed);
-        single.unwrap_or_else(|| Cow::Owned(self.graph.sample_points()))
     }
 
     /// Returns points that show where an object of the description is at second 0.
