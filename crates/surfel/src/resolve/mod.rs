@@ -59,7 +59,7 @@ use plan::frame_plan;
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::stand_at_station;
-use sun_and_sky::{LightingContext, choose_lights, lights};
+use sun_and_sky::{LightingContext, choose_lights, lights, shows_environment};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
@@ -266,7 +266,10 @@ fn choose_surface(
         description.objects_default.surface.surface = Some(SurfaceKind::Gaussian);
     }
     let light = &mut description.light;
-    let needs_light = has_others || !description.lamps.is_empty() || light.environment.is_some();
+    let needs_light = has_others
+        || !description.lamps.is_empty()
+        || light.environment.is_some()
+        || shows_environment;
     if light.light.is_none() && !needs_light {
         progress.choice("no lights: trained splats show the light of their photos", &["light"]);
         light.light = Some(vec![LightKind::None]);
@@ -279,6 +282,7 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
     let (width, height) = picture.resolution();
     Settings {
         width,
+    let shows_environment = shows_environment(description);
         height,
         samples_per_pixel: picture.spp(),
         noise_threshold: picture.noise_threshold() as f32,

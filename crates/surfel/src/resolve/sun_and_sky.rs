@@ -7,7 +7,8 @@ use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, Environment, InsideView, Light, Material, Sky, Sun, sunlit_fraction, visible_normals,
+    Background, Camera, Environment, InsideView, Light, Material, Sky, Sun, sunlit_fraction,
+    visible_normals,
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::words::format_length;
@@ -66,9 +67,11 @@ pub fn choose_lights(
     let SceneDescription { light, sun, sky, .. } = &mut chosen;
     let is_sun_open =
         light.light.is_none() && light.environment.is_none() && *sun == SunSettings::default();
+    let shows_environment = shows_environment(description);
     if is_lit && is_sun_open && context.is_inside {
         progress.choice("headlight: the camera stands in a closed room or tunnel", &["light"]);
-        light.light = Some(vec![LightKind::Headlight]);
+        let sky = shows_environment.then_some(LightKind::Sky);
+        light.light = Some(sky.into_iter().chain([LightKind::Headlight]).collect());
     } else if is_lit && is_sun_open && is_sun_hidden(context) {
         progress.choice("headlight: hardly any sun would reach what the scanner saw", &["light"]);
         light.light = Some(vec![LightKind::Sky, LightKind::Headlight]);
@@ -81,10 +84,10 @@ pub fn choose_lights(
     }
     if is_lit && light.has(LightKind::Sky) {
         choose_sky(sky, context, progress);
-    } else {
+    } else if !(shows_environment && light.has(LightKind::Sky)) {
         *sky = SkySettings::default();
     }
-    let has_environment = is_lit && light.environment.is_some();
+    let has_environment = (is_lit || shows_environment) && light.environment.is_some();
     light.environment_rotation = has_environment.then(|| light.environment_rotation());
     light.environment_strength = has_environment.then(|| light.environment_strength());
     chosen
@@ -107,8 +110,13 @@ fn is_lit(description: &SceneDescription, has_normals: bool) -> bool {
     has_normals || description.objects_default.surface.surface() != SurfaceKind::Points
 }
 
+/// Returns true if the background is the sky or the environment map, which show there also if they light nothing.
+pub fn shows_environment(description: &SceneDescription) -> bool {
+    description.picture.background() == Background::Environment
+}
+
 /// Returns the lights of the whole scene by a description whose lights are chosen. `has_normals` is true if points have
-/// normals, by which they are lit.
+/// normals, by which they are lit; of lights on others only what the background shows is left.
 pub fn lights(
     chosen: &SceneDescription,
     environment: Option<&Environment>,
@@ -117,7 +125,8 @@ pub fn lights(
 ) -> Result<Vec<Light>> {
     let settings = &chosen.light;
     let mut lights = Vec::new();
-    if !is_lit(chosen, has_normals) {
+    let is_lit = is_lit(chosen, has_normals);
+    if !is_lit && !shows_environment(chosen) {
         return Ok(lights);
     }
     if let Some(environment) = environment.filter(|_| settings.environment.is_some()) {
@@ -126,13 +135,13 @@ pub fn lights(
         environment.scale(settings.environment_strength() as f32);
         lights.push(Light::Environment(environment));
     }
-    if settings.has(LightKind::Sun) {
+    if is_lit && settings.has(LightKind::Sun) {
         lights.push(Light::Sun(sun(&chosen.sun, up)));
     }
     if settings.has(LightKind::Sky) {
         lights.push(Light::Sky(sky(&chosen.sky, up)));
     }
-    if settings.has(LightKind::Headlight) {
+    if is_lit && settings.has(LightKind::Headlight) {
         lights.push(Light::Headlight(HEADLIGHT));
     }
     Ok(lights)
@@ -336,6 +345,47 @@ mod tests {
         assert_eq!(kinds(true, None), (from_camera, None));
         assert_eq!(kinds(true, Some(10.0)), (outdoors.clone(), Some(10.0)));
         assert_eq!(kinds(false, None), (outdoors, Some(240.0)));
+    }
+
+    /// Returns the lights of points as pixels without normals, before a background of the environment or none.
+    fn lights_of_pixels(
+        environment: Option<&Environment>,
+        background: Option<Background>,
+    ) -> Vec<Light> {
+        let mut description = SceneDescription::default();
+        description.objects_default.surface.surface = Some(SurfaceKind::Points);
+        description.picture.background = background;
+        description.sky.strength = Some(2.0);
+        description.light.environment = environment.map(|_| "sky.hdr".into());
+        let points = PointCloud::default();
+        let chosen = choose_lights(&description, &context(DVec3::Y, &points), &NoProgress);
+        lights(&chosen, environment, Vec3::Z, false).unwrap()
+    }
+
+    #[test]
+    fn a_sky_that_lights_no_points_is_still_their_background() {
+        assert_eq!(lights_of_pixels(None, None), []);
+        match &lights_of_pixels(None, Some(Background::Environment))[..] {
+            [Light::Sky(sky)] => assert_eq!(sky.zenith, 2.0 * SKY_COLOR),
+            other => panic!("{other:?}"),
+        }
+        let map = Environment::new(2, 1, vec![Vec3::ONE; 2], Vec3::Z, 0.0).unwrap();
+        let found = lights_of_pixels(Some(&map), Some(Background::Environment));
+        assert!(matches!(found[..], [Light::Environment(_)]), "{found:?}");
+    }
+
+    #[test]
+    fn the_sky_is_the_background_of_a_closed_room_if_it_is_asked_for() {
+        let kinds = |background: Option<Background>| {
+            let points = PointCloud::default();
+            let context = LightingContext { is_inside: true, ..context(DVec3::Y, &points) };
+            let mut description = SceneDescription::default();
+            description.picture.background = background;
+            choose_lights(&description, &context, &NoProgress).light.light.unwrap_or_default()
+        };
+        assert_eq!(kinds(None), [LightKind::Headlight]);
+        let with_sky = [LightKind::Sky, LightKind::Headlight];
+        assert_eq!(kinds(Some(Background::Environment)), with_sky);
     }
 
     #[test]
