@@ -1,9 +1,10 @@
 //! Automatic exposure: a small preview shows how bright the median and the highlights of the scene are.
 
-use surfel_core::flat::FlatScene;
+use surfel_core::flat::{FlatGeometry, FlatScene, Instance};
 use surfel_core::math::{median, quantile};
 use surfel_core::progress::Progress;
 use surfel_core::render::{Renderer, Settings};
+use surfel_core::surface::SurfaceKind;
 
 /// Linear value of the highlights: sRGB 91 %, which leaves white roofs and foreheads their shape.
 const HIGHLIGHT_TARGET: f32 = 0.8;
@@ -26,7 +27,7 @@ const LIMITS: (f32, f32) = (-1.0, 2.2);
 /// Width of the preview in pixels.
 const WIDTH: u32 = 200;
 
-/// Returns the stops by which the lights of `scene` are too dark.
+/// Returns the stops by which the lights of `scene` are too dark on what they light.
 pub fn automatic_exposure(
     renderer: &dyn Renderer,
     scene: &FlatScene,
@@ -34,17 +35,36 @@ pub fn automatic_exposure(
     progress: &dyn Progress,
 ) -> surfel_core::Result<f32> {
     let height = u64::from(WIDTH) * u64::from(settings.height) / u64::from(settings.width);
+    let is_unlit: Vec<bool> = scene.instances.iter().map(|it| !is_lit(scene, it)).collect();
     let preview = Settings {
         width: WIDTH,
         height: height.clamp(1, 4 * u64::from(WIDTH)) as u32,
         samples_per_pixel: 1,
-        with_aovs: false,
+        with_aovs: is_unlit.contains(&true),
         ..*settings
     };
     let (image, _) = renderer.render(scene, &preview, progress)?;
-    let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
+    let instances = image.aovs.as_ref().map(|aovs| &aovs.instance_id[..]);
+    let shows_unlit = |pixel: usize| {
+        let instance = instances.map(|instances| instances[pixel] as usize);
+        instance.and_then(|instance| is_unlit.get(instance)).is_some_and(|is_unlit| *is_unlit)
+    };
+    let metered = (0..image.color.len())
+        .filter(|pixel| 0.0 < image.coverage[*pixel] && !shows_unlit(*pixel))
+        .map(|pixel| image.color[pixel]);
     // The strongest channel, not luminance: a meadow whose green is cut off turns to neon.
-    Ok(stops(covered.map(|([r, g, b, _], _)| r.max(*g).max(*b)).collect()))
+    Ok(stops(metered.map(|[r, g, b, _]| r.max(g).max(b)).collect()))
+}
+
+/// Returns true if the lights change how bright an instance is. Trained Gaussians, unlit materials, and points as pixels
+/// without normals have a brightness of their own.
+fn is_lit(scene: &FlatScene, instance: &Instance) -> bool {
+    let has_sides = match scene.geometry(instance) {
+        FlatGeometry::Cloud(cloud) => cloud.surface != SurfaceKind::Points || cloud.has_normals,
+        FlatGeometry::Mesh(_) => true,
+    };
+    let is_unlit = scene.materials[instance.material_idx as usize].is_unlit;
+    has_sides && !instance.is_gaussian && !is_unlit
 }
 
 fn stops(values: Vec<f32>) -> f32 {
@@ -64,6 +84,55 @@ mod tests {
     //! The stops for known pictures.
 
     use super::*;
+    use crate::description::SceneDescription;
+    use crate::memory_files::MemoryContent;
+    use crate::resolve::resolve;
+    use serde_json::json;
+    use std::path::Path;
+    use std::sync::Arc;
+    use surfel_core::math::Vec3;
+    use surfel_core::points::PointCloud;
+    use surfel_core::progress::NoProgress;
+
+    /// Returns what is said about the exposure of a dark square with some settings, beside a bright one of the material unlit
+    /// or alone.
+    fn exposure_line(settings: &[(&str, &str)], has_bright: bool) -> String {
+        let square = |brightness: u16| {
+            let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+            let mut cloud = PointCloud::from_positions((0..400).map(corner).collect());
+            cloud.colors = Some(vec![[brightness; 3]; 400]);
+            MemoryContent::Points(Arc::new(cloud), None)
+        };
+        let mut description = SceneDescription::default();
+        description.memory.insert("memory:dark", square(0x4000));
+        description.memory.insert("memory:bright", square(0xffff));
+        let dark = json!({ "file": "memory:dark" });
+        let bright =
+            json!({ "file": "memory:bright", "material": "unlit", "translate": [22, 0, 0] });
+        for table in [Some(dark), has_bright.then_some(bright)].into_iter().flatten() {
+            description.add_object(table.as_object().unwrap(), Path::new("")).unwrap();
+        }
+        for (key, value) in [("resolution", "64x36"), ("gamma", "1")].iter().chain(settings) {
+            description.set(key, &json!(value), Path::new("")).unwrap();
+        }
+        let scene = resolve(&description, &NoProgress).unwrap().build(&NoProgress).unwrap();
+        let lines = scene.choices().iter().map(|choice| choice.reason.clone());
+        lines.filter(|line| line.starts_with("exposure")).collect()
+    }
+
+    #[test]
+    fn what_lights_do_not_change_does_not_decide_about_their_strength() {
+        let unlit = [("material", "unlit")];
+        assert_eq!(exposure_line(&unlit, false), "exposure +0.00 stops");
+        let pixels = [("surface", "points"), ("background", "environment")];
+        assert_eq!(exposure_line(&pixels, false), "exposure +0.00 stops");
+        let stops = |has_bright: bool| {
+            let line = exposure_line(&[], has_bright);
+            line.split(' ').nth(1).unwrap().parse::<f32>().unwrap()
+        };
+        let (alone, beside) = (stops(false), stops(true));
+        assert!(1.0 < alone && (alone - beside).abs() < 0.3, "{alone} {beside}");
+    }
 
     #[test]
     fn stops_bring_the_highlights_to_the_target() {
