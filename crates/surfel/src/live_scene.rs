@@ -267,6 +267,7 @@ impl LiveScene {
     ) -> Result<LiveView> {
         let loaded = self.loaded_for(description, progress)?;
         let (kept, mut auto) = self.choose(description, progress)?;
+        let description = &auto.with_color(description);
         if self.use_case == UseCase::Viewers {
             let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
             let is_open = description.camera.interior() != Interior::Off;
@@ -296,8 +297,8 @@ impl LiveScene {
             color_source: kept.color_source(),
             moves_camera,
             unit,
-            trees,
             turned_room: auto.turned_room,
+            trees,
         })
     }
 

@@ -202,6 +202,11 @@ impl Room {
         (0..3).all(|axis| (self.low[axis]..self.high[axis]).contains(&local[axis]))
     }
 
+    /// Returns true if a world position lies within the room and below its ceiling, which a courtyard lacks.
+    pub fn encloses(&self, position: DVec3) -> bool {
+        self.has_ceiling && self.contains(position)
+    }
+
     /// Returns the direction of view into the room over its southernmost corner, rotated by `azimuth_deg` clockwise
     /// seen from above.
     pub fn view_direction(&self, azimuth_deg: f64, elevation_deg: Option<f64>) -> DVec3 {
@@ -317,6 +322,9 @@ mod tests {
         let open = find_part(|p| p.z < 2.4).unwrap();
         let above = camera_at(DVec3::new(3.0, 2.0, 20.0));
         assert_eq!(open.planes_before(&above), [], "the walls are not cut");
+        let within = DVec3::new(3.0, 2.0, 1.2);
+        assert!(open.contains(within) && !open.encloses(within));
+        assert!(find_part(|_| true).is_some_and(|closed| closed.encloses(within)));
         assert_eq!(find_part(|p| p.z < 2.4 && p.x < 5.9), None);
         assert_eq!(find_part(|p| 0.1 < p.z && p.z < 2.4), None);
     }

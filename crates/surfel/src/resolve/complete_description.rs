@@ -25,7 +25,7 @@ pub fn complete_description(
     complete.world.up = Some(auto.up);
     complete.camera = description_camera(scene, auto, description);
     let color = &mut complete.objects_default.color.color;
-    *color = color.take().or_else(|| common_color(scene, description));
+    *color = color.take().or_else(|| Some(common_color(scene, description)?.0));
     let of_files = file_objects(scene, description);
     let of_scene = description.objects.iter().map(|object| ObjectDescription {
         material: material_of_object(description, object).cloned(),
@@ -38,13 +38,16 @@ pub fn complete_description(
     complete
 }
 
-/// The colour of all clouds that leave it open, if it is the same.
-fn common_color(scene: &LoadedScene, description: &SceneDescription) -> Option<ColorSource> {
+/// Returns the colour of all clouds that leave it open, if it is the same, and the reason for the choice.
+pub fn common_color(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+) -> Option<(ColorSource, String)> {
     let open =
         scene.clouds().filter(|(i, _)| scene.settings_of(*i, description).color.color.is_none());
-    let mut chosen = open.map(|(_, cloud)| choose_source(cloud).0);
-    let first = chosen.next()?;
-    chosen.all(|other| other == first).then_some(first)
+    let mut chosen = open.map(|(_, cloud)| choose_source(cloud));
+    let (first, reason) = chosen.next()?;
+    chosen.all(|(other, _)| other == first).then_some((first, reason))
 }
 
 /// The labels of files that are parts of one object.

@@ -52,9 +52,9 @@ use crate::error::Result;
 use crate::overlay::{Overlay, faults};
 use crate::progress_log::{Choice, ProgressLog};
 use camera::SceneExtent;
-use complete_description::complete_description;
+use complete_description::{common_color, complete_description};
 use inside::{Inside, choose_inside};
-use interior::{choose_room, hidden_ceiling, hidden_walls};
+use interior::{choose_room, has_splats, hidden_ceiling, hidden_walls};
 use plan::frame_plan;
 use point_size::choose_point_size;
 use spread::report_gaps;
@@ -65,7 +65,7 @@ use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
-use surfel_core::scene::color::Legend;
+use surfel_core::scene::color::{ColorSource, Legend};
 use surfel_core::scene::{
     Camera, ClipPlane, Light, Projection, Room, Scene, find_room, inlier_bounds,
 };
@@ -129,7 +129,7 @@ pub struct AutoSettings {
     pub hidden_walls: Vec<ClipPlane>,
     /// The room on a turntable, whose walls before the camera each frame hides.
     pub turned_room: Option<Room>,
-    /// The description, with the chosen lights written into it.
+    /// The description, with the chosen surface, colours, plan and lights written into it.
     description: SceneDescription,
 }
 
@@ -144,33 +144,38 @@ impl AutoSettings {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let mut chosen = description.clone();
         let points = scene.shown_points(description);
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
-        let camera = stand_at_station(&description.camera, scene, up)?;
-        let mut description = SceneDescription { camera, ..description.clone() };
-        choose_surface(scene, &mut description, progress);
+        chosen.camera = stand_at_station(&description.camera, scene, up)?;
+        progress.check()?;
+        choose_surface(scene, &mut chosen, progress);
+        choose_color(scene, &mut chosen, progress);
+        progress.check()?;
         let bounds = inlier_bounds(&points);
-        frame_plan(scene, &mut description, (&points, bounds), up, progress)?;
+        frame_plan(scene, &mut chosen, (&points, bounds), up, progress)?;
         let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
-        stand_sun_at_date(scene, &mut description, middle, up, progress)?;
-        let description = &description;
+        stand_sun_at_date(scene, &mut chosen, middle, up, progress)?;
         report_gaps(&points, progress);
+        progress.check()?;
         let found_room = find_room(&points, up);
-        let room = choose_room(scene, description, found_room.as_ref(), progress);
-        let inside = choose_inside(scene, &points, description, up, room, progress);
+        let room = choose_room(scene, &chosen, found_room.as_ref(), progress);
+        progress.check()?;
+        let inside = choose_inside(scene, &points, &chosen, up, room, progress);
         let view = inside.as_ref().map(Inside::view);
+        progress.check()?;
         let extent = SceneExtent { points: &points, bounds, up, room, inside: view };
-        let motion = camera_motion(description)?;
-        let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
+        let motion = camera_motion(&chosen)?;
+        let camera = SceneCamera::choose(&scene.graph, &extent, &chosen, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
-        let turned_room = room.cloned().filter(|_| description.output.turntable.is_some());
+        let turned_room = room.cloned().filter(|_| chosen.output.turntable.is_some());
         let hidden_walls = match &turned_room {
             Some(room) => hidden_ceiling(room, &camera.camera, progress),
             None => hidden_walls(room, &camera.camera, progress),
         };
         let is_inside = matches!(inside, Some(Inside::Tunnel(_)))
-            || found_room.is_some_and(|room| room.contains(camera.camera.position));
-        let has_normals = scene.has_normals(description);
+            || found_room.is_some_and(|room| room.encloses(camera.camera.position));
+        let has_normals = scene.has_normals(&chosen);
         let context = LightingContext {
             camera: camera.camera,
             up,
@@ -180,10 +185,19 @@ impl AutoSettings {
             points: &points,
             inside: view,
         };
-        let mut description = choose_lights(description, &context, progress);
-        choose_point_size(scene, &mut description, &points, &camera.camera, progress);
-        let lights = lights(&description, scene.environment.as_ref(), up, has_normals)?;
-        Ok(Self { up, camera, lights, hidden_walls, turned_room, description })
+        progress.check()?;
+        chosen = choose_lights(&chosen, &context, progress);
+        choose_point_size(scene, &mut chosen, &points, &camera.camera, progress);
+        let lights = lights(&chosen, scene.environment.as_ref(), up, has_normals)?;
+        Ok(Self { up, camera, lights, hidden_walls, turned_room, description: chosen })
+    }
+
+    /// Returns a description with the colours that were chosen for all clouds.
+    pub(crate) fn with_color(&self, description: &SceneDescription) -> SceneDescription {
+        let mut with_color = description.clone();
+        let chosen = &self.description.objects_default.color.color;
+        with_color.objects_default.color.color.clone_from(chosen);
+        with_color
     }
 
     /// Returns the description with everything that was chosen written into it.
@@ -265,6 +279,7 @@ fn choose_surface(
     if n_splats == open.len() {
         description.objects_default.surface.surface = Some(SurfaceKind::Gaussian);
     }
+    let shows_environment = shows_environment(description);
     let light = &mut description.light;
     let needs_light = has_others
         || !description.lamps.is_empty()
@@ -276,13 +291,27 @@ fn choose_surface(
     }
 }
 
+/// Chooses the colours of all clouds that leave them open, if these are the same, before the points are prepared: pictures and
+/// descriptions of it then agree. Trained splats have colours of their own, and each file of a sequence those that suit it.
+fn choose_color(scene: &LoadedScene, description: &mut SceneDescription, progress: &dyn Progress) {
+    if has_splats(scene) || scene.has_sequences() {
+        return;
+    }
+    let Some((source, reason)) = common_color(scene, description) else { return };
+    // The line about intensity comes with its range.
+    if source != ColorSource::Intensity {
+        let keys = ["color", "cmap", "range", "gamma"];
+        progress.choice(&format!("color {source}: {reason}"), &keys);
+    }
+    description.objects_default.color.color = Some(source);
+}
+
 /// Returns size and quality of a description's picture. A file that is not EXR takes no layers beside the colour.
 pub fn render_settings(description: &SceneDescription) -> Settings {
     let picture = &description.picture;
     let (width, height) = picture.resolution();
     Settings {
         width,
-    let shows_environment = shows_environment(description);
         height,
         samples_per_pixel: picture.spp(),
         noise_threshold: picture.noise_threshold() as f32,
