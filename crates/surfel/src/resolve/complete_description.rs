@@ -5,7 +5,7 @@ use super::loaded::LoadedScene;
 use super::{AutoSettings, description_camera};
 use crate::description::{KeyedSettings, ObjectDescription, ObjectOverride, SceneDescription};
 use std::path::Path;
-use surfel_core::scene::color::{ColorSource, choose_source};
+use surfel_core::scene::color::ColorSource;
 
 /// Returns the description with everything that was chosen written into it. It makes the same picture, byte for byte.
 /// The lights of `description` are chosen already.
@@ -45,7 +45,7 @@ pub fn common_color(
 ) -> Option<(ColorSource, String)> {
     let open =
         scene.clouds().filter(|(i, _)| scene.settings_of(*i, description).color.color.is_none());
-    let mut chosen = open.map(|(_, cloud)| choose_source(cloud));
+    let mut chosen = open.map(|(i, cloud)| scene.suitable_color(i, cloud, description));
     let (first, reason) = chosen.next()?;
     chosen.all(|(other, _)| other == first).then_some((first, reason))
 }
@@ -84,4 +84,38 @@ fn file_objects(
             ..ObjectDescription::default()
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    //! The colours of a description are those of its picture.
+
+    use crate::SceneDescription;
+    use crate::memory_files::MemoryContent;
+    use crate::resolve::resolve;
+    use std::sync::Arc;
+    use surfel_core::math::Vec3;
+    use surfel_core::points::PointCloud;
+    use surfel_core::progress::NoProgress;
+    use surfel_core::scene::Geometry;
+    use surfel_core::scene::color::ColorSource;
+
+    #[test]
+    fn points_that_are_dropped_choose_no_colors() {
+        // A plane with colours, and more points of noise that are black.
+        let point = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let mut cloud = PointCloud::from_positions((0..1000).map(point).collect());
+        let is_noise = |i: u32| 400 <= i;
+        let color = |i: u32| if is_noise(i) { [0; 3] } else { [0x8080, 0x4040, 0x2020] };
+        cloud.classification = Some((0..1000).map(|i| if is_noise(i) { 7 } else { 2 }).collect());
+        cloud.colors = Some((0..1000).map(color).collect());
+        let mut description = SceneDescription::of_files(["memory:plane"]);
+        description.memory.insert("memory:plane", MemoryContent::Points(Arc::new(cloud), None));
+        description.objects_default.color.gamma = Some(1.0);
+        let resolved = resolve(&description, &NoProgress).unwrap();
+        let chosen = resolved.description.objects_default.color.color;
+        assert_eq!(chosen, Some(ColorSource::Rgb));
+        let Geometry::Points(points) = &resolved.scene.graph.geometries[0] else { panic!() };
+        assert!(points.colors().iter().all(|color| *color == [0x80, 0x40, 0x20]));
+    }
 }

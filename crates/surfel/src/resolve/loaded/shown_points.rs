@@ -8,6 +8,7 @@ use surfel_core::points::{
     select_points,
 };
 use surfel_core::progress::NoProgress;
+use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Geometry, Graph, Mesh, PART};
 
 /// Maximum number of points of a cloud that are looked at where some of them are dropped, or where it is of several files.
@@ -51,6 +52,19 @@ impl LoadedScene {
     pub fn sample_points(&self) -> Cow<'_, PointCloud> {
         let single = self.single_cloud().map(Cow::Borrowed);
         single.unwrap_or_else(|| Cow::Owned(self.graph.sample_points()))
+    }
+
+    /// Returns the source of colours that suits the points of a cloud that its preparation keeps, and the reason for the choice.
+    pub(crate) fn suitable_color(
+        &self,
+        geometry: usize,
+        cloud: &PointCloud,
+        description: &SceneDescription,
+    ) -> (ColorSource, String) {
+        match self.sample_of_kept(geometry, cloud, description) {
+            Some(kept) => choose_source(&kept),
+            None => choose_source(cloud),
+        }
     }
 
     /// Returns a sample of the points of a cloud that its preparation keeps, in which a column tells several files apart;

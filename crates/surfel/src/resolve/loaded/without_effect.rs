@@ -9,7 +9,7 @@ use crate::description::{
 use surfel_core::progress::Progress;
 use surfel_core::render::MIN_ADAPTIVE_SAMPLES;
 use surfel_core::scene::Background;
-use surfel_core::scene::color::{ColorSource, choose_source};
+use surfel_core::scene::color::ColorSource;
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::{BitDepth, FileInfo, TextColumn};
 
@@ -45,10 +45,11 @@ impl LoadedScene {
         if self.graph.geometries.is_empty() {
             return;
         }
-        let clouds = self.clouds().map(|(i, cloud)| (self.settings_of(i, description), cloud));
-        let (surfaces, sources): (Vec<SurfaceKind>, Vec<ColorSource>) = clouds
-            .map(|(settings, cloud)| {
-                let source = || choose_source(cloud).0;
+        let (surfaces, sources): (Vec<SurfaceKind>, Vec<ColorSource>) = self
+            .clouds()
+            .map(|(i, cloud)| {
+                let settings = self.settings_of(i, description);
+                let source = || self.suitable_color(i, cloud, description).0;
                 let surface = surface_of(cloud, &settings);
                 (surface, settings.color.color.unwrap_or_else(source))
             })
