@@ -54,7 +54,8 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
             Some(found) if found.up == Vec3::Y => found,
             _ => choice(Vec3::Z, format!("up is +Z, the convention of {format}")),
         },
-        _ if is_camera_frame(&offsets()) => {
+        // The survey of a drone whose middle is zero lies in the field of view of a camera, too.
+        _ if shape.terrain().is_none() && is_camera_frame(&offsets()) => {
             let view = "the field of view of a depth camera at the origin";
             choice(Vec3::NEG_Y, format!("up is -Y: nearly all points lie in {view}"))
         }
@@ -223,6 +224,20 @@ mod tests {
         assert_eq!(inferred(depth_frame()), Vec3::NEG_Y);
         let elsewhere = depth_frame().into_iter().map(|p| p - 2.0 * Vec3::Z);
         assert_eq!(inferred(elsewhere), Vec3::Z);
+    }
+
+    #[test]
+    fn terrain_above_zero_is_no_depth_image() {
+        let mut random = Random::new(11, 0);
+        let mut next = || random.next_f32();
+        for [side, low, high] in [[150.0, 240.0, 260.0], [200.0, 100.0, 130.0]] {
+            let mut point = || {
+                let [x, y] = [0.05, 0.04].map(|frequency| (side * (next() - 0.5), frequency));
+                let hills = 0.25 * ((x.0 * x.1).sin() + (y.0 * y.1).cos()) + 0.5;
+                Vec3::new(x.0, y.0, low + (high - low) * hills)
+            };
+            assert_eq!(inferred((0..5000).map(|_| point())), Vec3::Z);
+        }
     }
 
     #[test]

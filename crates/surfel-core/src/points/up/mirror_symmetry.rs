@@ -11,19 +11,24 @@ const MIN_SYMMETRIC: f64 = 0.98;
 /// Maximum such fraction along the other two axes: a box or a ball has no left and right.
 const MAX_OTHER: f64 = 0.9;
 
+/// Minimum size along the mirror axis in cells: what is thinner fills the cells of its mirror image by itself.
+const MIN_CELLS_ALONG_AXIS: f32 = 8.0;
+
 /// Minimum number of points: a few are symmetric by chance.
 const MIN_POINTS: usize = 1000;
 
 /// Returns the one axis along which the points are their own mirror image, as far as a grid of cells tells; none if
-/// they are so along no axis or along several.
+/// they are so along no axis or along several, or are thin along it.
 pub fn mirror_axis(points: &[Vec3]) -> Option<usize> {
     if points.len() < MIN_POINTS {
         return None;
     }
-    let fractions = Occupancy::of(points).mirrored_fractions(points);
+    let occupancy = Occupancy::of(points);
+    let fractions = occupancy.mirrored_fractions(points);
     let axis = (0..3).find(|&axis| MIN_SYMMETRIC <= fractions[axis])?;
     let is_only = (0..3).all(|other| other == axis || fractions[other] <= MAX_OTHER);
-    is_only.then_some(axis)
+    let n_cells = occupancy.bounds.size()[axis] * occupancy.cells_per_unit;
+    (is_only && MIN_CELLS_ALONG_AXIS <= n_cells).then_some(axis)
 }
 
 /// The cells of a grid that hold points or are next to one that does.
@@ -130,6 +135,20 @@ mod tests {
         assert_eq!(mirror_axis(&cube), None);
         let slab: Vec<Vec3> = cube.iter().map(|p| *p * Vec3::new(1.0, 0.01, 2.0)).collect();
         assert_eq!(mirror_axis(&slab), None);
+    }
+
+    #[test]
+    fn thin_points_are_no_mirror_image_along_their_thickness() {
+        // The floor of a trench with one bend.
+        let mut random = Random::new(3, 0);
+        let mut next = || random.next_f32();
+        let trench: Vec<Vec3> = (0..20_000)
+            .map(|i| {
+                let [x, y] = if i % 2 == 0 { [12.0, 2.0] } else { [2.0, 9.0] };
+                Vec3::new(x * next(), y * next(), 0.2 * next())
+            })
+            .collect();
+        assert_eq!(mirror_axis(&trench), None);
     }
 
     #[test]
