@@ -10,8 +10,8 @@ use crate::resolve::{
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::points::{
-    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, denoise, prepare,
-    select_points,
+    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, STRUCTURE,
+    StructureChoice, denoise, prepare, select_points,
 };
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
@@ -162,14 +162,20 @@ fn prepared(
         preparation.orientation = Orientation::Auto;
     }
     let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
+    let (has_normals, has_radii) = (columns.normals || had_normals, columns.radii || had_radii);
+    // Normals hold the directions of lines.
+    if !has_normals {
+        preparation.structure = StructureChoice::Surface;
+    }
     let (cloud, prepared) = prepare(cloud, &preparation, progress)?;
     let mut cloud = cloud.into_inner();
     progress.end();
-    if !columns.normals && !had_normals {
+    if !has_normals {
         cloud.normals = None;
     }
-    if !columns.radii && !had_radii {
+    if !has_radii {
         cloud.radii = None;
+        cloud.scalars.retain(|scalar| !scalar.name.eq_ignore_ascii_case(STRUCTURE));
     }
     report_denoise(&prepared, progress);
     if columns.normals {
@@ -225,7 +231,9 @@ mod tests {
     use crate::crs::{CoordinateSystem, Unit};
     use crate::progress_log::{Choice, ProgressLog};
     use surfel_core::math::{DVec3, Vec3};
-    use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, Scalar, ScanStation, Subsample, Values};
+    use surfel_core::points::{
+        COLUMN_INDEX, ROW_INDEX, Radius, Scalar, ScanStation, Subsample, Values,
+    };
     use surfel_core::progress::NoProgress;
     use surfel_formats::{FileInfo, SaveOptions};
 
@@ -314,6 +322,24 @@ mod tests {
             stations: vec![ScanStation { position: Some(DVec3::ZERO), ..ScanStation::default() }],
             ..PointCloud::from_positions(cells().map(position).collect())
         }
+    }
+
+    #[test]
+    fn structures_are_kept_only_with_their_normals_and_radii() {
+        let wire = || {
+            let point = |i: i32| Vec3::new(0.02 * i as f32, 0.0, 3.0);
+            PointCloud::from_positions((0..600).map(point).collect())
+        };
+        let description = SceneDescription::default();
+        let options = PrepareOptions { normals: true, ..PrepareOptions::default() };
+        let loaded = Loaded { cloud: wire(), info: FileInfo::default() };
+        let cloud = prepare_points(loaded, &description, options, &NoProgress).unwrap().cloud;
+        assert!(cloud.normals.is_some() && cloud.radii.is_none() && cloud.structures().is_none());
+        let radius = Some(Radius::default());
+        let cloud = prepare_with(wire(), |settings| settings.radius = radius).0.cloud;
+        assert!(cloud.normals.is_none() && cloud.radii.is_some() && cloud.structures().is_none());
+        let cloud = prepare_with(wire(), |_| ()).0.cloud;
+        assert!(cloud.normals.is_some() && cloud.radii.is_some() && cloud.structures().is_some());
     }
 
     #[test]

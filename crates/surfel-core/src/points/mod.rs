@@ -1,8 +1,8 @@
 //! Point clouds as columns, and the preparation that tracing needs.
 //!
-//! `prepare` runs the preparation from its first step to its last, with the settings of `preparation`; `estimate` has the
-//! steps that share one search for neighbours, and `morph_offsets` repeats them for morph targets. A folder for each
-//! subject:
+//! `prepare` runs the preparation from its first step to its last, with the settings of `preparation`: `select_points`
+//! drops points, `estimate` has the steps that share one search for neighbours, `morph_offsets` repeats them for morph
+//! targets, and `add_columns` writes the results. A folder for each subject:
 //!
 //! - `cloud`: the columns of points, conditions on them, merging;
 //! - `neighbors`: the points around each point;
@@ -26,8 +26,10 @@ mod structure;
 mod denoising;
 mod gaps;
 mod preparation;
+mod select_points;
 mod estimate;
 mod morph_offsets;
+mod add_columns;
 mod prepared_cloud;
 mod prepare;
 #[cfg(test)]
@@ -54,13 +56,14 @@ pub use denoising::line_axes::LineReport;
 pub use normals::orient::{Orientation, orient};
 pub use normals::planes::{NormalReport, PlaneFit, fit_plane};
 pub use preparation::{Preparation, SURFACE_VARIATION};
-pub use prepare::{PreparationReport, prepare, select_points};
+pub use prepare::{PreparationReport, prepare};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
 pub use radii::radius::{DEFAULT_RADIUS_SAMPLES, Radius, RadiusReport, spacing};
 pub use scan::grid_rays::locate_stations;
 pub use scan::mixed_pixels::MixedPixels;
 pub use scan::scan_angle::{POINT_SOURCE, SCAN_ANGLE};
+pub use select_points::select_points;
 pub use structure::point_shape::{
     PointShape, STRUCTURE, Structure, StructureChoice, StructureReport,
 };

@@ -35,8 +35,7 @@ pub struct Preparation {
     pub normals: Neighborhood,
     /// True to estimate the normals that the file lacks. Spheres and pixels need none.
     pub estimates_normals: bool,
-    /// The signs of normals. Applies if all normals are estimated. `Auto` and `Station` also turn those of the file, if
-    /// all stations are known.
+    /// The signs of normals. `Auto` and `Station` turn those of the file only if all stations are known.
     pub orientation: Orientation,
     /// True to take the lengths of the file's normals for radii, if these vary as radii do and the file has no others.
     pub radii_from_normals: bool,
@@ -45,7 +44,7 @@ pub struct Preparation {
     /// The choice of structures. Applies if all radii are estimated, and differ from point to point.
     pub structure: StructureChoice,
     /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
-    /// structures are found.
+    /// structures are found, and no points of the grid are left out as outliers or by a subsample.
     pub free_space: bool,
     /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
     pub keep_variation: bool,

@@ -1,26 +1,26 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
-use super::cleaning::clean::{CleanReport, clean};
-use super::cleaning::outliers::remove_outliers;
-use super::cleaning::subsample::subsample;
+use super::add_columns::{
+    add_normals, add_radii, add_structures, add_variation, drop_parted_structures,
+    orient_given_normals, orientation_by_rings,
+};
+use super::cleaning::clean::CleanReport;
 use super::denoising::denoise::{Denoise, DenoiseReport, denoise};
 use super::denoising::line_axes::{LineReport, find_axes, move_to_axes};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
 use super::morph_offsets::add_morph_offsets;
 use super::neighbors::Neighborhood;
-use super::normals::orient::{Orientation, has_stations, orient, turn_to_stations};
-use super::normals::planes::{NormalReport, PlaneFit, fill_missing};
-use super::preparation::{Preparation, SURFACE_VARIATION};
+use super::normals::planes::NormalReport;
+use super::preparation::Preparation;
 use super::radii::curvature::radii_by_curvature;
 use super::radii::normal_lengths::take_radii_from_normals;
 use super::radii::radius::{Radius, RadiusReport};
-use super::scan::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::scan::scan_rings::ScanRings;
+use super::select_points::{Selection, select};
 use super::structure::elevation_grid::elevation_grid;
-use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
-use super::{PointCloud, PreparedCloud, Scalar, Values};
+use super::structure::point_shape::{Structure, StructureChoice, StructureReport};
+use super::{PointCloud, PreparedCloud};
 use crate::error::{Error, Result};
-use crate::math::Vec3;
 use crate::progress::Progress;
 use crate::words::counted;
 
@@ -45,40 +45,6 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans a cloud, and drops mixed pixels, points beyond a subsample and outliers, as the preparation says. A column of
-/// normals or radii of which no usable entry is left is removed.
-///
-/// # Errors
-///
-/// Returns [`Error::Setting`] for a setting out of range, [`Error::TooManyPoints`] beyond 32-bit indices, and
-/// [`Error::Cancelled`] if `progress` is cancelled.
-pub fn select_points(
-    cloud: PointCloud,
-    preparation: &Preparation,
-    progress: &dyn Progress,
-) -> Result<(PointCloud, CleanReport)> {
-    let (mut cloud, report) =
-        clean(cloud, preparation.duplicates, &preparation.kept_noise, progress)?;
-    if preparation.mixed_pixels == MixedPixels::Drop
-        && let Some(kept) = without_mixed_pixels(&cloud)
-    {
-        let n_mixed = cloud.len() - kept.len();
-        let line = format!("{} between two surfaces dropped", counted(n_mixed, "mixed pixel"));
-        progress.choice(&line, &["mixed_pixels"]);
-        cloud = cloud.subset(&kept);
-    }
-    if let Some(choice) = preparation.subsample {
-        cloud = subsample(&cloud, choice, preparation.seed, progress)?;
-    }
-    if let Some(choice) = preparation.remove_outliers {
-        cloud = remove_outliers(&cloud, choice, progress)?;
-    }
-    let is_missing = |normal: &Vec3| *normal == Vec3::ZERO;
-    cloud.normals = cloud.normals.filter(|normals| !normals.iter().all(is_missing));
-    cloud.radii = cloud.radii.filter(|radii| !radii.iter().all(|radius| *radius == 0.0));
-    Ok((cloud, report))
-}
-
 /// Cleans a cloud, thins it, removes outliers and noise, then adds the radii that are missing, and the normals if they
 /// are wanted. Those of the file stay. Columns that are estimated get offsets in each morph target, estimated from the
 /// points where the target moves them.
@@ -97,10 +63,14 @@ pub fn prepare(
     if preparation.radii_from_normals {
         take_radii_from_normals(&mut cloud, progress)?;
     }
-    let (mut cloud, clean) = select_points(cloud, preparation, progress)?;
+    let Selection { mut cloud, report: clean, is_thinned } = select(cloud, preparation, progress)?;
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
+    drop_parted_structures(&mut cloud, preparation);
+    // The rays of points that were left out say nothing about free space.
+    let preparation =
+        &Preparation { free_space: preparation.free_space && !is_thinned, ..preparation.clone() };
     let missing = Missing::any(&cloud, preparation);
     let rings = if missing.fits { ScanRings::find(&cloud, progress)? } else { None };
     if let Some(ScanRings { rings, .. }) = &rings
@@ -158,9 +128,8 @@ pub fn prepare(
             report.normals_from = Some(neighborhood);
         }
     }
-    let by_stations = matches!(preparation.orientation, Orientation::Auto | Orientation::Station);
-    if by_stations && !estimated.normals {
-        turn_given_normals(&mut cloud, progress);
+    if !estimated.normals {
+        orient_given_normals(&mut cloud, preparation.orientation, progress)?;
     }
     if let Some((mut radii, mut found)) = radii {
         if let (Radius::Curvature { k }, Some(normals)) = (preparation.radius, &cloud.normals) {
@@ -184,106 +153,17 @@ pub fn prepare(
     Ok((PreparedCloud::new(cloud)?, report))
 }
 
-/// Adds the column of structures, and gives the points of lines the direction of the line in place of a normal.
-fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
-    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
-    if let Some(normals) = &mut cloud.normals {
-        for (normal, shape) in normals.iter_mut().zip(shapes) {
-            if shape.structure == Structure::Line {
-                *normal = shape.normal;
-            }
-        }
-    }
-    cloud.set_structures(&structures);
-}
-
-fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
-    let values = Values::F32(fits.iter().map(|fit| fit.variation).collect());
-    cloud.scalars.retain(|scalar| scalar.name != SURFACE_VARIATION);
-    cloud.scalars.push(Scalar { name: SURFACE_VARIATION.to_owned(), values });
-}
-
-/// Returns the orientation of the preparation, or that toward the scanner if normals are missing altogether and rings show
-/// where it stood.
-fn orientation_by_rings(
-    cloud: &PointCloud,
-    preparation: &Preparation,
-    rings: Option<&ScanRings>,
-    progress: &dyn Progress,
-) -> Orientation {
-    match (preparation.orientation, rings) {
-        (Orientation::Auto, Some(rings)) if cloud.normals.is_none() => {
-            let [x, y, z] = rings.scanner.to_array();
-            progress.choice(&format!("front sides toward the scanner at {x},{y},{z}"), &["orient"]);
-            Orientation::Viewpoint(rings.scanner)
-        }
-        (orientation, _) => orientation,
-    }
-}
-
-fn add_normals(
-    cloud: &mut PointCloud,
-    fits: &[PlaneFit],
-    orientation: Orientation,
-    progress: &dyn Progress,
-) -> Result<NormalReport> {
-    let Some(given) = cloud.normals.take() else {
-        let mut normals = fits.iter().map(|fit| fit.normal).collect::<Vec<_>>();
-        let report = fill_missing(&cloud.positions, &mut normals, progress)?;
-        cloud.normals = Some(orient(cloud, normals, orientation, progress)?);
-        return Ok(report);
-    };
-    // Each takes its sign from the nearest normal of the file; `select_points` leaves at least one.
-    let mut normals = given.clone();
-    fill_missing(&cloud.positions, &mut normals, progress)?;
-    let mut report = NormalReport::default();
-    for ((normal, given), fit) in normals.iter_mut().zip(&given).zip(fits) {
-        if *given != Vec3::ZERO {
-            continue;
-        }
-        if fit.normal == Vec3::ZERO {
-            report.n_from_nearest += 1;
-        } else {
-            *normal = if normal.dot(fit.normal) < 0.0 { -fit.normal } else { fit.normal };
-            report.n_estimated += 1;
-        }
-    }
-    cloud.normals = Some(normals);
-    Ok(report)
-}
-
-/// Turns the normals of the file to the stations, if these are known.
-fn turn_given_normals(cloud: &mut PointCloud, progress: &dyn Progress) {
-    let Some(mut normals) = cloud.normals.take() else { return };
-    let n_turned = if has_stations(cloud) { turn_to_stations(cloud, &mut normals) } else { 0 };
-    if 0 < n_turned {
-        let line = format!(
-            "{} of the file turned toward the station of each scan",
-            counted(n_turned, "normal")
-        );
-        progress.choice(&line, &["orient"]);
-    }
-    cloud.normals = Some(normals);
-}
-
-fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {
-    match &mut cloud.radii {
-        None => cloud.radii = Some(estimated),
-        Some(radii) => {
-            let missing = radii.iter_mut().zip(estimated).filter(|(radius, _)| **radius == 0.0);
-            missing.for_each(|(radius, estimated)| *radius = estimated);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     //! Prepared columns, reports and errors.
 
     use super::*;
-    use crate::math::{DVec3, Random};
+    use crate::math::{DVec3, Random, Vec3};
     use crate::points::neighbors::NeighborMethod;
-    use crate::points::{STRUCTURE, StructureChoice, Subsample};
+    use crate::points::scan::scan_grid::tests::scan;
+    use crate::points::{
+        Orientation, STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample, Values,
+    };
     use crate::progress::NoProgress;
 
     fn ball(n_points: usize) -> PointCloud {
@@ -447,6 +327,59 @@ mod tests {
         let notes = listener.0.lock().unwrap();
         assert_eq!(notes.iter().filter(|note| note.contains("without a plane")).count(), 1);
         assert!(notes.iter().all(|note| !note.starts_with("normals")), "{notes:?}");
+    }
+
+    #[test]
+    fn structures_without_their_normals_or_radii_are_found_again() {
+        let wire = (0..600).map(|i| Vec3::new(0.02 * i as f32, 0.0, 3.0)).collect();
+        let wire = PointCloud::from_positions(wire);
+        let preparation = Preparation { denoise: Denoise::Off, ..Preparation::default() };
+        let (found, _) = prepare(wire, &preparation, &NoProgress).unwrap();
+        let found = found.into_inner();
+        let again = |change: fn(&mut PointCloud)| {
+            let mut cloud = found.clone();
+            change(&mut cloud);
+            prepare(cloud, &preparation, &NoProgress).unwrap().0.into_inner()
+        };
+        let is_along = |normal: &Vec3| 0.99 < normal.x.abs();
+        assert!(found.normals.as_ref().unwrap().iter().all(is_along));
+        assert_eq!(again(|cloud| cloud.normals = None), found);
+        assert_eq!(again(|cloud| cloud.radii = None), found);
+        // A column that merely has this name.
+        let other = |cloud: &mut PointCloud| {
+            cloud.radii = None;
+            cloud.scalars[0].values = Values::U8((0..600).map(|i| i as u8).collect());
+        };
+        assert_eq!(again(other), found);
+    }
+
+    #[test]
+    fn a_chosen_orientation_turns_the_normals_of_a_file() {
+        let viewpoint = Orientation::Viewpoint(DVec3::ZERO);
+        for (orientation, sense) in [(viewpoint, -1.0), (Orientation::SpanningTree, 1.0)] {
+            let mut cloud = ball(3000);
+            let sign = |i: usize| if i.is_multiple_of(3) { -1.0 } else { 1.0 };
+            let given = cloud.positions.iter().enumerate().map(|(i, p)| sign(i) * *p);
+            cloud.normals = Some(given.collect());
+            let preparation = Preparation { orientation, ..Preparation::default() };
+            let cloud = prepare(cloud, &preparation, &NoProgress).unwrap().0;
+            let pairs = cloud.normals().iter().zip(cloud.positions());
+            assert!(pairs.into_iter().all(|(normal, p)| 0.0 < sense * normal.dot(*p)));
+        }
+    }
+
+    #[test]
+    fn thinned_grids_keep_the_discs_of_a_closed_wall() {
+        let wall = scan(60, 60, |row, column| {
+            let [azimuth, elevation] = [column, row].map(|index| 0.01 * (index as f32 - 30.0));
+            Some(4.0 / (azimuth.cos() * elevation.cos()))
+        });
+        let radii = |free_space: bool| {
+            let subsample = Some(Subsample::Random(3000));
+            let preparation = Preparation { free_space, subsample, ..Preparation::default() };
+            prepare(wall.clone(), &preparation, &NoProgress).unwrap().0.radii().to_vec()
+        };
+        assert_eq!(radii(true), radii(false));
     }
 
     #[test]

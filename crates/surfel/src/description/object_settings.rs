@@ -123,7 +123,8 @@ settings! {
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
         /// (leaves) apart; surface treats all points as surface, scatter all as scattered.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
-        /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell.
+        /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell unless points are left
+        /// out: by default also of filtered files.
         free_space: bool = Preparation::default().free_space, Flag, "BOOL";
         /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
         salvage: bool = false, Flag, "BOOL";
@@ -216,7 +217,8 @@ impl ObjectSettings {
             } else {
                 StructureChoice::Surface
             },
-            free_space: settings.free_space(),
+            // The rays of points that a filter left out say nothing.
+            free_space: settings.free_space.unwrap_or(!settings.filters_points()),
             // A colour may ask for a column that only the preparation computes.
             keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
             seed,

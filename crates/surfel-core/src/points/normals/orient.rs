@@ -15,6 +15,9 @@ use std::str::FromStr;
 /// Number of neighbours that each point is linked to. Each link takes about 10 bytes per point for a while.
 const DEGREE: usize = 8;
 
+/// Minimum fraction of the points whose station is known.
+const MIN_WITH_STATION: f64 = 0.99;
+
 /// Marks an unused link.
 const NONE: u32 = u32::MAX;
 
@@ -65,11 +68,7 @@ pub fn orient(
                 (viewpoint - cloud.positions[i].as_dvec3()).dot(normal.as_dvec3()) < 0.0
             }))
         }
-        Orientation::Station => {
-            let mut normals = normals;
-            turn_to_stations(cloud, &mut normals);
-            Ok(normals)
-        }
+        Orientation::Station => Ok(turn_to_stations(cloud, normals)),
         Orientation::ScanAngle => {
             let sights = SightLines::new(cloud);
             let toward = |i: usize| sights.as_ref().map_or(DVec3::Z, |s| s.toward_scanner(i));
@@ -80,22 +79,25 @@ pub fn orient(
     }
 }
 
-/// Flips the normals that point away from the known station of their point, and returns their number: no scanner sees a
-/// surface from behind.
-pub(crate) fn turn_to_stations(cloud: &PointCloud, normals: &mut [Vec3]) -> usize {
-    let Some(scan_of) = cloud.scan_of_point() else { return 0 };
-    let turned = normals.par_iter_mut().enumerate().filter(|(i, normal)| {
-        let station = cloud.stations.get(scan_of.get(*i)).and_then(|station| station.position);
-        let offset = station.map_or(DVec3::ZERO, |station| station - cloud.world_position(*i));
+/// Flips the normals that point away from the known station of their point: no scanner sees a surface from behind.
+fn turn_to_stations(cloud: &PointCloud, normals: Vec<Vec3>) -> Vec<Vec3> {
+    let Some(scan_of) = cloud.scan_of_point() else { return normals };
+    flip_if(normals, |i, normal| {
+        let station = cloud.stations.get(scan_of.get(i)).and_then(|station| station.position);
+        let offset = station.map_or(DVec3::ZERO, |station| station - cloud.world_position(i));
         offset.dot(normal.as_dvec3()) < 0.0
-    });
-    turned.map(|(_, normal)| *normal = -*normal).count()
+    })
 }
 
-/// Returns true if the positions of all stations of a cloud are known.
+/// Returns true if the positions of all stations of a cloud are known, and the station of nearly all points.
 pub(crate) fn has_stations(cloud: &PointCloud) -> bool {
     let is_known = cloud.stations.iter().all(|station| station.position.is_some());
-    is_known && !cloud.is_empty() && cloud.station_of(0).is_some()
+    let Some(scan_of) = cloud.scan_of_point().filter(|_| is_known && !cloud.is_empty()) else {
+        return false;
+    };
+    let has_station = |point: &usize| scan_of.get(*point) < cloud.stations.len();
+    let n_with_station = (0..cloud.len()).into_par_iter().filter(has_station).count();
+    MIN_WITH_STATION * cloud.len() as f64 <= n_with_station as f64
 }
 
 /// Returns the most trusted orientation that the columns and the shape of a cloud allow.
@@ -433,6 +435,13 @@ mod tests {
         let station = |position| ScanStation { position, ..ScanStation::default() };
         let scan = PointCloud { stations: vec![station(Some(DVec3::Z))], ..flight.clone() };
         assert_eq!(choose_orientation(&scan, &normals), Orientation::Station);
+        // A point without a station comes first.
+        let of_point = |i: usize| if i == 0 { u16::MAX } else { 0 };
+        let indices = Values::U16((0..scan.len()).map(of_point).collect());
+        let mut merged = scan;
+        merged.stations.push(station(Some(DVec3::X)));
+        merged.scalars.push(Scalar { name: STATION.into(), values: indices });
+        assert_eq!(choose_orientation(&merged, &normals), Orientation::Station);
         let unposed = PointCloud { stations: vec![station(None)], ..flight };
         assert_eq!(choose_orientation(&unposed, &normals), Orientation::ScanAngle);
         let (balls, mixed) = balls();

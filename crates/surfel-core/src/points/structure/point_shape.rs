@@ -134,16 +134,18 @@ impl PointShape {
 }
 
 impl PointCloud {
-    /// Returns the structure of a point, as far as the cloud has a column of structures.
+    /// Returns the structure of each point; `None` without a column of structures. A column with other numbers merely has
+    /// this name.
     pub fn structures(&self) -> Option<Vec<Structure>> {
         let of_code = |code: &u8| match code {
-            1 => Structure::Line,
-            2 => Structure::Scatter,
-            3 => Structure::Redundant,
-            _ => Structure::Surface,
+            0 => Some(Structure::Surface),
+            1 => Some(Structure::Line),
+            2 => Some(Structure::Scatter),
+            3 => Some(Structure::Redundant),
+            _ => None,
         };
         match self.scalar(STRUCTURE)? {
-            Values::U8(codes) => Some(codes.iter().map(of_code).collect()),
+            Values::U8(codes) => codes.iter().map(of_code).collect(),
             _ => None,
         }
     }
