@@ -1,6 +1,6 @@
 //! Conditions as trees.
 
-use super::polygon::Polygon;
+use super::polygon::Polygons;
 use crate::words::counted;
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub(super) enum Condition {
     /// Two numbers are in a relation.
     Compare(Operand, Relation, Operand),
     /// At least one of these contains the point.
-    Within(Vec<Polygon>),
+    Within(Polygons),
 }
 
 /// A number of a comparison.

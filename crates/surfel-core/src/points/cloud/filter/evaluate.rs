@@ -1,7 +1,6 @@
 //! Evaluates conditions column by column, on blocks of points.
 
 use super::condition::{Condition, Operand, Relation};
-use super::polygon::Polygon;
 use crate::error::{Error, Result};
 use crate::points::{COLOR_8_TO_16, PointCloud, Values};
 use std::ops::Range;
@@ -71,8 +70,7 @@ impl<'a> Evaluation<'a> {
                 let positions = &self.cloud.positions[start..start + matches.len()];
                 for (is_match, position) in matches.iter_mut().zip(positions) {
                     let position = self.cloud.origin + position.as_dvec3();
-                    let is_inside = |polygon: &Polygon| polygon.contains([position.x, position.y]);
-                    *is_match = polygons.iter().any(is_inside);
+                    *is_match = polygons.contain([position.x, position.y]);
                 }
             }
             Condition::Compare(left, relation, right) => {

@@ -9,6 +9,7 @@ use condition::{Condition, Operand, Relation};
 pub use evaluate::visit_column;
 use evaluate::{Evaluation, color_range};
 pub(crate) use polygon::Polygon;
+use polygon::Polygons;
 use std::fmt;
 use std::str::FromStr;
 
@@ -68,7 +69,7 @@ impl PointFilter {
     pub fn within_polygons(polygons: &[Vec<Vec<[f64; 2]>>]) -> Result<Self> {
         let polygons: Result<Vec<Polygon>> =
             polygons.iter().map(|rings| Polygon::new(rings)).collect();
-        Ok(Self { condition: Condition::Within(polygons?) })
+        Ok(Self { condition: Condition::Within(Polygons::new(polygons?)) })
     }
 
     /// The filter that keeps points that all of these keep.
