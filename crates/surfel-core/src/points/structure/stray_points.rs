@@ -46,8 +46,13 @@ pub fn limit_stray_points(
     }
     let (centers, radii) = sizes.trusted(shapes, all.positions());
     let discs = TrustedDiscs { sizes, radii, tree: KdTree::new(&centers, progress)? };
-    shapes.par_iter_mut().enumerate().for_each(|(point, shape)| discs.limit(all, point, shape));
-    Ok(())
+    shapes.par_iter_mut().enumerate().try_for_each(|(point, shape)| {
+        if point.is_multiple_of(4096) {
+            progress.check()?;
+        }
+        discs.limit(all, point, shape);
+        Ok(())
+    })
 }
 
 /// The sizes of a cloud's discs.
@@ -64,7 +69,9 @@ impl DiscSizes {
     /// Returns the sizes, or `None` if too few points lie on surfaces.
     fn of(shapes: &[PointShape]) -> Option<Self> {
         let radii: Vec<f32> = shapes.iter().filter(is_surface).map(|shape| shape.radius).collect();
-        let is_enough = MIN_ON_SURFACES * shapes.len() as f32 <= radii.len() as f32;
+        // Redundant discs have the size of their neighbours, but lie on surfaces all the same.
+        let n_on_surfaces = shapes.iter().filter(|shape| shape.is_disc()).count();
+        let is_enough = MIN_ON_SURFACES * shapes.len() as f32 <= n_on_surfaces as f32;
         (!radii.is_empty() && is_enough).then(|| Self {
             n_discs: radii.len(),
             typical: sampled_quantile(&radii, 0.5),
@@ -147,6 +154,18 @@ mod tests {
         let mut random = Random::new(1, 0);
         let mut next = || random.next_f32() - 0.5;
         (0..n).map(|_| Vec3::new(length * next(), width * next(), 0.0)).collect()
+    }
+
+    #[test]
+    fn redundant_discs_are_of_surfaces() {
+        let shapes = |structure, n| vec![PointShape { structure, normal: Vec3::Z, radius: 0.1 }; n];
+        let scan = [
+            shapes(Structure::Redundant, 60),
+            shapes(Structure::Surface, 20),
+            shapes(Structure::Scatter, 20),
+        ];
+        assert_eq!(DiscSizes::of(&scan.concat()).unwrap().n_discs, 20);
+        assert!(DiscSizes::of(&scan[1..].concat()[10..]).is_none());
     }
 
     #[test]
