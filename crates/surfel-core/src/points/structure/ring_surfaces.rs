@@ -127,21 +127,23 @@ struct RingPoint {
 }
 
 impl RingSurfaces<'_> {
-    /// Narrows the discs of nearest neighbours that reach beyond the next ring, up to the nearest rays that passed through
-    /// them.
+    /// Narrows the discs of nearest neighbours that reach beyond the next ring above, for the highest ring below, up to the
+    /// nearest rays that passed through them.
     fn narrow_wide_discs(&self, shapes: &mut [PointShape], progress: &dyn Progress) -> Result<()> {
-        for (ring, pair) in self.rings.windows(2).enumerate() {
+        for (ring, Ring { points, elevation_rad, .. }) in self.rings.iter().enumerate() {
             progress.check()?;
-            let step_rad = pair[1].elevation_rad - pair[0].elevation_rad;
+            let next =
+                self.rings.get(ring + 1).or(ring.checked_sub(1).map(|below| &self.rings[below]));
+            let Some(next) = next else { continue };
+            let step_rad = (next.elevation_rad - elevation_rad).abs();
             let radius = |(index, point): (usize, &u32)| {
                 let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
                 let gap = step_rad * self.position(point).distance(self.scanner);
                 let is_wide = gap < shape.radius && shape.structure != Structure::Line;
                 is_wide.then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
             };
-            let radii: Vec<Option<f32>> =
-                pair[0].points.par_iter().enumerate().map(radius).collect();
-            for (point, radius) in pair[0].points.iter().zip(radii) {
+            let radii: Vec<Option<f32>> = points.par_iter().enumerate().map(radius).collect();
+            for (point, radius) in points.iter().zip(radii) {
                 let shape = &mut shapes[*point as usize];
                 shape.radius = radius.unwrap_or(shape.radius);
             }
@@ -369,6 +371,36 @@ mod tests {
         assert!(100 < near.len(), "{}", near.len());
         // Planes through neighbours on one ring alone would leave 0.16 of them level.
         assert!(0.4 * near.len() as f32 <= n_level as f32, "{n_level} of {}", near.len());
+    }
+
+    #[test]
+    fn discs_of_the_highest_ring_end_where_its_rays_passed() {
+        // A pillar before a wall, both seen by two rings.
+        let azimuths: Vec<f32> = (-100..=100).map(|i| 0.01 * i as f32).collect();
+        let range = |azimuth: f32| if azimuth.abs() < 0.1 { 5.0 } else { 20.0 };
+        let mut positions = Vec::new();
+        let rings = [-0.09f32, 0.0].map(|elevation_rad| {
+            let points = azimuths.iter().map(|azimuth| {
+                let level = range(*azimuth) * elevation_rad.cos();
+                let up = range(*azimuth) * elevation_rad.sin();
+                positions.push(Vec3::new(level * azimuth.cos(), level * azimuth.sin(), up));
+                positions.len() as u32 - 1
+            });
+            Ring { elevation_rad, points: points.collect(), azimuths: azimuths.clone() }
+        });
+        let surfaces = RingSurfaces {
+            positions: &positions,
+            rings: &rings,
+            scanner: Vec3::ZERO,
+            max_turn: 0.03,
+        };
+        let wide = PointShape { structure: Structure::Surface, normal: Vec3::X, radius: 2.0 };
+        let mut shapes = vec![wide; positions.len()];
+        surfaces.narrow_wide_discs(&mut shapes, &NoProgress).unwrap();
+        for ring in &rings {
+            let middle = shapes[ring.points[100] as usize];
+            assert!((0.4..1.0).contains(&middle.radius), "{middle:?}");
+        }
     }
 
     #[test]
