@@ -12,7 +12,7 @@ use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_sur
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
 use super::see_through::open_see_through_discs;
-use super::solids::{apply_structure, ball_radius, clamp_solids};
+use super::solids::{apply_structure, ball_radius, clamp_solids, second_distance};
 use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
@@ -24,7 +24,6 @@ use crate::error::Result;
 use crate::math::{Aabb, Vec3};
 use crate::points::neighbors::{KdTree, Neighbor, Neighborhood};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
-use crate::points::radii::radius::kth_distance;
 use crate::points::scan::scan_rings::Ring;
 use crate::points::up::is_mostly_land;
 use crate::progress::Progress;
@@ -32,6 +31,8 @@ use rayon::prelude::*;
 
 /// Maximum width of the neighbourhood of a line.
 const MAX_LINE_WIDTH: f32 = 0.04;
+/// Number of neighbours of a point whose neighbourhood spans no plane.
+const N_REFIT_NEIGHBORS: usize = 16;
 /// Number of neighbours for a second look at points that lie in no plane.
 const N_MANY_NEIGHBORS: usize = 48;
 /// Number of neighbours for a third look: a surface whose noise is as large as its spacing shows only from afar.
@@ -110,9 +111,13 @@ pub fn find_structures(
         structures
     };
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
+        if point.is_multiple_of(4096) {
+            progress.check()?;
+        }
         apply_structure(tree, point, radii[point], *structure, shape);
+        Ok(())
     };
-    shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
+    shapes.par_iter_mut().zip(&structures).enumerate().try_for_each(finish)?;
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     if is_land && !is_elevation_grid {
@@ -136,7 +141,7 @@ pub fn all_scattered(
     radii: &[f32],
     progress: &dyn Progress,
 ) -> Result<(Vec<PointShape>, StructureReport)> {
-    let distance = |_: usize, neighbors: &[Neighbor]| kth_distance(neighbors, 2);
+    let distance = |point: usize, neighbors: &[Neighbor]| second_distance(tree, point, neighbors);
     let distances = tree.map(Neighborhood::Nearest(2), progress, distance)?;
     let shape = |(distance, radius): (&f32, &f32)| PointShape {
         structure: Structure::Scatter,
@@ -173,6 +178,15 @@ fn decide(
         shape: PointShape { structure, normal, radius },
         is_above_land: false,
     };
+    let positions = tree.positions();
+    // Few points within a distance of another span no plane, and nor do those of a line.
+    let fit = &match fit.normal {
+        Vec3::ZERO => {
+            let nearest = tree.nearest(positions[point], N_REFIT_NEIGHBORS, Some(point as u32));
+            fit_plane(positions, point, &nearest)
+        }
+        _ => *fit,
+    };
     if is_line(fit) {
         return shape(Structure::Line, fit.normal);
     }
@@ -181,7 +195,6 @@ fn decide(
     if is_surface && (is_even || fit.is_smooth) {
         return shape(Structure::Surface, fit.normal);
     }
-    let positions = tree.positions();
     let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
     let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
     let side = if typical.has_edges() {
@@ -298,6 +311,19 @@ mod tests {
             let n_scatter = fraction(&cloud.structures().unwrap(), Structure::Scatter);
             assert!(n_scatter < 0.01, "{noise}: {n_scatter}");
         }
+    }
+
+    #[test]
+    fn points_without_neighbors_within_a_distance_are_no_lines() {
+        let plane = random_points(5000, 6, |[x, y, z]| Vec3::new(x, y, 0.001 * z));
+        let preparation =
+            Preparation { normals: Neighborhood::Within(0.005), ..Preparation::default() };
+        let cloud = PointCloud::from_positions(plane);
+        let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+        let n_lines = fraction(&cloud.structures().unwrap(), Structure::Line);
+        assert!(n_lines < 0.01, "{n_lines}");
+        let n_level = cloud.normals().iter().filter(|normal| 0.9 < normal.z.abs()).count();
+        assert!(4950 < n_level, "{n_level}");
     }
 
     #[test]

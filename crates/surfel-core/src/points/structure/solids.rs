@@ -44,7 +44,7 @@ pub fn apply_structure(
         Structure::Line => {
             let neighbors = tree.nearest(position, N_STRAIGHT_NEIGHBORS, Some(point as u32));
             let mut line = LineFit::of(tree.positions(), point, &neighbors);
-            let mut reach = kth_distance(&neighbors, 2);
+            let mut reach = distance_elsewhere(&neighbors, 2);
             if line.width < MAX_STRAIGHT_WIDTH {
                 reach = reach.max(CAPSULE_ASPECT * line.thickness);
             } else {
@@ -56,7 +56,7 @@ pub fn apply_structure(
         }
         Structure::Scatter => {
             let neighbors = tree.nearest(position, 2, Some(point as u32));
-            shape.radius = ball_radius(kth_distance(&neighbors, 2), radius);
+            shape.radius = ball_radius(second_distance(tree, point, &neighbors), radius);
         }
     }
     shape.structure = structure;
@@ -95,6 +95,25 @@ impl LineFit {
             thickness: THICKNESS_OF_DEVIATION * across,
         }
     }
+}
+
+/// Returns the distance from a point to the second of its neighbours, which `nearest` has, or of those elsewhere if both
+/// are at the point's own position.
+pub fn second_distance(tree: &KdTree, point: usize, nearest: &[Neighbor]) -> f32 {
+    match kth_distance(nearest, 2) {
+        0.0 => {
+            let position = tree.positions()[point];
+            let more = tree.nearest(position, N_STRAIGHT_NEIGHBORS, Some(point as u32));
+            distance_elsewhere(&more, 2)
+        }
+        distance => distance,
+    }
+}
+
+/// Returns the distance to the k-th or else the last of the neighbours at other positions, or zero without such.
+fn distance_elsewhere(neighbors: &[Neighbor], k: usize) -> f32 {
+    let n_equal = neighbors.partition_point(|neighbor| neighbor.distance_squared == 0.0);
+    kth_distance(&neighbors[n_equal..], k)
 }
 
 /// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
@@ -161,6 +180,21 @@ mod tests {
             assert!(0.99 < shape.normal.dot(direction).abs(), "{shape:?}");
             let thickness = shape.radius / CAPSULE_ASPECT / THICKNESS;
             assert!((0.7..1.4).contains(&thickness), "{thickness}");
+        }
+    }
+
+    #[test]
+    fn solids_of_points_that_coincide_are_no_larger() {
+        let line: Vec<Vec3> = (0..40).map(|i| 0.1 * i as f32 * Vec3::X).collect();
+        for structure in [Structure::Line, Structure::Scatter] {
+            let radius = |n_equal: usize| {
+                let points: Vec<Vec3> = line.iter().flat_map(|p| vec![*p; n_equal]).collect();
+                let tree = KdTree::new(&points, &NoProgress).unwrap();
+                let mut shape = PointShape { structure, normal: Vec3::Z, radius: 9.0 };
+                apply_structure(&tree, points.len() / 2, 9.0, structure, &mut shape);
+                shape.radius
+            };
+            assert!((radius(4) - radius(1)).abs() < 1e-6, "{structure:?}: {}", radius(4));
         }
     }
 

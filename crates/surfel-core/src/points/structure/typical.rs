@@ -2,7 +2,7 @@
 
 use super::edge_planes::PLANE_THICKNESS;
 use super::point_shape::is_surface;
-use crate::math::sampled_quantile;
+use crate::math::{Vec3, sampled_quantile};
 use crate::points::normals::planes::PlaneFit;
 
 /// Ratio of a radius to the typical one from which the neighbourhood is sparse.
@@ -21,7 +21,9 @@ pub struct Typical {
 impl Typical {
     /// Returns the typical properties of the planes through the neighbours of each point, and of the points' radii.
     pub fn of(fits: &[PlaneFit], radii: &[f32]) -> Self {
-        let variations: Vec<f32> = fits.iter().map(|fit| fit.variation).collect();
+        // Neighbours that span no plane say nothing about noise.
+        let planes = fits.iter().filter(|fit| fit.normal != Vec3::ZERO);
+        let variations: Vec<f32> = planes.map(|fit| fit.variation).collect();
         Self {
             variation: sampled_quantile(&variations, 0.5),
             low_variation: sampled_quantile(&variations, 0.25),
