@@ -34,8 +34,8 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
     let mut values = vec![T::default(); positions.len()];
     let n_slots = index.n_slots();
     progress.begin("neighbours", n_slots as u64);
-    // Blocks bound the memory of values that are not yet in the order of the points.
-    let block_size = index.chunk_size().max(1 << 18);
+    // Blocks bound the memory of values that are not yet in the order of the points, and keep all threads busy.
+    let block_size = block_size(index.chunk_size(), rayon::current_num_threads());
     for block in ranges(0..n_slots, block_size) {
         let chunks: Vec<Range<usize>> = ranges(block, index.chunk_size()).collect();
         let visited = chunks.into_par_iter().map(|slots| {
@@ -55,6 +55,11 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
         values[point] = visit(point, &[]);
     }
     Ok(values)
+}
+
+/// Returns the number of slots whose values are put in order together: enough chunks for all threads.
+fn block_size(chunk_size: usize, n_threads: usize) -> usize {
+    (2 * n_threads * chunk_size).max(1 << 18)
 }
 
 /// Writes visited values, of which each list is in the order of the points, to `values`, of which each thread owns a part.
@@ -78,4 +83,18 @@ fn scatter<T: Copy + Send + Sync>(visited: &[Vec<(u32, T)>], values: &mut [T]) {
 fn ranges(whole: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
     let end = whole.end;
     whole.step_by(size).map(move |first| first..end.min(first + size))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Blocks.
+
+    use super::*;
+
+    #[test]
+    fn large_chunks_leave_no_thread_idle() {
+        assert_eq!(block_size(4096, 2), 1 << 18);
+        let chunk_size = (100 << 20) / 64;
+        assert!(16 * chunk_size <= block_size(chunk_size, 16));
+    }
 }

@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Maximum number of cells per point. Beyond it the array is too large, which outliers cause.
+/// Maximum number of cells per point. Beyond it the array is too large, which outliers and short distances cause.
 const MAX_CELLS_PER_POINT: usize = 2;
 
 /// Marks the absence of a slot.
@@ -27,8 +27,8 @@ pub(super) struct ScanLine<'a> {
 }
 
 impl<'a> ScanLine<'a> {
-    /// Sorts the points for the sweep. Returns none, with a note, if an outlier would make the array larger than the
-    /// cloud.
+    /// Sorts the points for the sweep. Returns none, with a note, if an outlier or a short distance would make the
+    /// array larger than the cloud.
     pub fn new(
         positions: &'a [Vec3],
         distance: f32,
@@ -50,8 +50,7 @@ impl<'a> ScanLine<'a> {
         let n_all_cells = n_cells[0].saturating_mul(n_cells[1]);
         if MAX_CELLS_PER_POINT * points.len() + 1024 < n_all_cells {
             progress.note(&format!(
-                "the scan-line array would need {n_all_cells} cells for {} points because of an outlier: \
-                 grid used instead",
+                "the scan-line array would need {n_all_cells} cells for {} points: grid used instead",
                 points.len()
             ));
             return Ok(None);
