@@ -74,7 +74,7 @@ pub fn clean(
     let mut cloud = if dropped.is_empty() { cloud } else { without(&cloud, &dropped) };
     clean_normals(&mut cloud, &mut report);
     clean_radii(&mut cloud, &mut report);
-    for line in report.lines() {
+    for line in report.lines(kept_noise) {
         progress.note(&line);
     }
     Ok((cloud, report))
@@ -82,11 +82,16 @@ pub fn clean(
 
 impl CleanReport {
     /// Returns one line for each kind of repair that was made.
-    fn lines(&self) -> Vec<String> {
+    fn lines(&self, kept_noise: &[u8]) -> Vec<String> {
+        let is_dropped = |class: &&u8| !kept_noise.contains(class);
+        let noise = match NOISE_CLASSES.iter().filter(is_dropped).collect::<Vec<_>>()[..] {
+            [class] => format!("class of noise {class}"),
+            _ => "classes of noise (7, 18)".to_owned(),
+        };
         let counts = [
             (self.n_invalid_positions, "point", "dropped: no position, or beyond 1e15"),
             (self.n_unmeasured, "point", "dropped: at exactly 0, 0, 0, where nothing was measured"),
-            (self.n_noise, "point", "dropped: classes of noise (7, 18)"),
+            (self.n_noise, "point", &format!("dropped: {noise}")),
             (self.n_withheld, "point", "dropped: flagged withheld"),
             (self.n_duplicates, "point", "dropped: at exactly the position of another"),
             (self.n_invalid_normals, "normal", "treated as missing: zero or not finite"),
@@ -112,7 +117,9 @@ fn find_dropped(
         return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
     }
     progress.check()?;
-    let unmeasured = unmeasured_position(cloud);
+    let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
+    // Points of a model may be at zero at rest.
+    let unmeasured = if may_part { None } else { unmeasured_position(cloud) };
     let is_unmeasured = |i: u32| unmeasured == Some(positions[i as usize]);
     let is_invalid = |i: u32| !is_valid_position(positions[i as usize]) || is_unmeasured(i);
     let is_noise = |class: &u8| NOISE_CLASSES.contains(class) && !kept_noise.contains(class);
@@ -133,7 +140,6 @@ fn find_dropped(
     dropped.par_extend(indices.into_par_iter().filter(is_unseen));
     report.n_withheld = dropped.len() - n_dropped - report.n_noise;
     let n_dropped = dropped.len();
-    let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
     if !may_part && !cloud.has_gaussians() {
         let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i) && !is_withheld(i);
         let found = find_duplicates(cloud, is_candidate, progress)?;
@@ -268,7 +274,7 @@ mod tests {
 
     use super::*;
     use crate::math::{DVec3, Random};
-    use crate::points::Scalar;
+    use crate::points::{Morph, Scalar};
     use crate::progress::NoProgress;
 
     fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
@@ -310,6 +316,16 @@ mod tests {
         assert_eq!(cleaned(elsewhere).1.n_duplicates, MIN_UNMEASURED - 1);
         assert_eq!(cleaned(at_the_zero_of_its_file).1.n_unmeasured, MIN_UNMEASURED);
         assert_eq!(cleaned(all_equal).0.len(), 1);
+    }
+
+    #[test]
+    fn points_that_move_are_measured_wherever_they_are_at_rest() {
+        let mut positions = vec![Vec3::ZERO; MIN_UNMEASURED];
+        positions.push(Vec3::X);
+        let offsets = (0..positions.len()).map(|i| i as f32 * Vec3::Y).collect();
+        let morph = Morph { positions: offsets, ..Morph::default() };
+        let cloud = PointCloud { morphs: vec![morph], ..PointCloud::from_positions(positions) };
+        assert_eq!(cleaned(cloud.clone()).0, cloud);
     }
 
     #[test]
@@ -399,6 +415,8 @@ mod tests {
         cloud.classification = Some(vec![5, 7, 18]);
         let (cloud, report) = clean(cloud, Duplicates::Drop, &[5, 7], &NoProgress).unwrap();
         assert_eq!((cloud.classification, report.n_noise), (Some(vec![5, 7]), 1));
+        assert_eq!(report.lines(&[5, 7]), ["1 point dropped: class of noise 18"]);
+        assert_eq!(report.lines(&[]), ["1 point dropped: classes of noise (7, 18)"]);
     }
 
     #[test]
