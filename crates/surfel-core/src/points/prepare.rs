@@ -320,7 +320,11 @@ mod tests {
         assert!(line.starts_with("normals of 3000 points from planes through 16 neighbours,"));
         // A line of points far away has no planes.
         cloud.positions.extend((0..40).map(|i| Vec3::X * (1000.0 + i as f32)));
-        let grid = Preparation { neighbors: NeighborMethod::Grid, ..Preparation::default() };
+        let grid = Preparation {
+            neighbors: NeighborMethod::Grid,
+            structure: StructureChoice::Surface,
+            ..Preparation::default()
+        };
         let (_, report) = prepare(cloud, &grid, &listener).unwrap();
         let line = report.normals.unwrap().line(report.normals_from.unwrap());
         assert!(line.starts_with("normals of 3040 points from all points within 0."), "{line}");
@@ -334,7 +338,8 @@ mod tests {
         let wire = (0..600).map(|i| Vec3::new(0.02 * i as f32, 0.0, 3.0)).collect();
         let wire = PointCloud::from_positions(wire);
         let preparation = Preparation { denoise: Denoise::Off, ..Preparation::default() };
-        let (found, _) = prepare(wire, &preparation, &NoProgress).unwrap();
+        let (found, report) = prepare(wire, &preparation, &NoProgress).unwrap();
+        assert_eq!(report.normals.unwrap().repairs(), None, "a line spans no plane");
         let found = found.into_inner();
         let again = |change: fn(&mut PointCloud)| {
             let mut cloud = found.clone();

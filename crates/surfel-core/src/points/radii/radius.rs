@@ -66,6 +66,8 @@ pub struct RadiusReport {
     pub n_clamped: usize,
     /// Number of radii replaced by the median, or by 1, as duplicates or a single point give no distance.
     pub n_replaced: usize,
+    /// True if structures have changed radii: those of lines, scattered points, and discs at gaps.
+    pub follows_structure: bool,
 }
 
 /// Estimates a radius for every point. `seed` selects the sample of `Radius::Median`.
@@ -183,17 +185,20 @@ impl RadiusReport {
     /// Returns a line about the radii for the user.
     pub fn line(&self, radius: Radius) -> String {
         let [min, median, max] = [self.min, self.median, self.max].map(format_length);
+        let by_structure =
+            if self.follows_structure { ", or what lines, leaves and gaps ask for" } else { "" };
         match radius {
             Radius::Fixed(_) => format!("radius {median}, as given"),
             Radius::Median { n, .. } => {
                 format!("radius {median}, the median distance to the {} nearest points", 2 * n)
             }
             Radius::Adaptive { k } => format!(
-                "radii {min} to {max}, median {median}: the distance to the {} neighbour",
+                "radii {min} to {max}, median {median}: the distance to the {} neighbour{by_structure}",
                 ordinal(k)
             ),
             Radius::Curvature { k } => format!(
-                "radii {min} to {max}, median {median}: the distance to the {} neighbour, less where the surface bends",
+                "radii {min} to {max}, median {median}: the distance to the {} neighbour, less where the surface \
+                 bends{by_structure}",
                 ordinal(k)
             ),
         }
@@ -417,6 +422,9 @@ mod tests {
         };
         let line = report.line(Radius::Adaptive { k: 12 });
         assert_eq!(line, "radii 0.459 to 7.63, median 0.701: the distance to the 12th neighbour");
+        let of_shapes = RadiusReport { follows_structure: true, ..report };
+        let line = of_shapes.line(Radius::Adaptive { k: 12 });
+        assert!(line.ends_with("12th neighbour, or what lines, leaves and gaps ask for"), "{line}");
         assert_eq!([1, 2, 3, 11, 22].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd"]);
     }
 
