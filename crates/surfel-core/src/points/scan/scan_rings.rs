@@ -38,10 +38,14 @@ const MIN_IN_ORDER: f32 = 0.98;
 const MAX_TURN: f32 = 0.75 * PI;
 /// Minimum turn back, in radians, at which the points of the next laser begin.
 const MIN_TURN_BACK: f32 = 0.2;
-/// Minimum variation of the ranges of a laser, as a fraction of their median, and minimum fraction of the lasers that have
-/// it. Spheres, columns and vases about the zero have rings of points, too, each at one distance.
-const MIN_VARIATION: f32 = 0.01;
-const MIN_VARIED: f32 = 0.05;
+/// Minimum jump of the range between successive points of a laser, as a fraction of the range, and minimum ratio to its
+/// changes before and after. Spheres, vases and ellipsoids about the zero have rings of points, too, but no jumps.
+const MIN_JUMP: f32 = 0.05;
+const MIN_JUMP_RATIO: f32 = 4.0;
+/// Minimum turn, in median turns of a laser, over rays that measured nothing.
+const MIN_GAP: f32 = 4.0;
+/// Minimum fraction of the lasers with jumps or gaps.
+const MIN_WITH_JUMPS: f32 = 0.05;
 /// Minimum median step between the elevations of successive lasers, in radians.
 const MIN_STEP_RAD: f32 = 5e-4;
 /// Marks a point without a ring.
@@ -124,9 +128,7 @@ impl ScanRings {
             progress.check()?;
             let found =
                 find(&directions).and_then(|rings_of_points| rings(&directions, &rings_of_points));
-            if let Some(rings) =
-                found.filter(|rings| is_stated || have_variation(rings, &directions))
-            {
+            if let Some(rings) = found.filter(|rings| is_stated || have_jumps(rings, &directions)) {
                 return Ok(Some(Self { scanner, rings }));
             }
         }
@@ -179,19 +181,18 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
         return None;
     }
     let direction = |point: &u32| directions[*point as usize];
-    let mut widths = Vec::new();
-    let mut ring = |mut points: Vec<u32>| {
+    let ring = |mut points: Vec<u32>| {
         let elevations = points.iter().filter_map(direction).map(|one| one.elevation_deg);
         let elevations: Vec<f32> = elevations.collect();
         let [low, elevation_deg, high] =
             [0.25, 0.5, 0.75].map(|part| sampled_quantile(&elevations, part));
-        widths.push((high - low).to_radians());
         let azimuth = |point: &u32| direction(point).map_or(0.0, |one| one.azimuth);
         points.sort_by(|a, b| azimuth(a).total_cmp(&azimuth(b)));
         let azimuths = points.iter().map(azimuth).collect();
-        Ring { elevation_rad: elevation_deg.to_radians(), azimuths, points }
+        let ring = Ring { elevation_rad: elevation_deg.to_radians(), azimuths, points };
+        (ring, (high - low).to_radians())
     };
-    let mut rings: Vec<Ring> = of_ring.into_iter().map(&mut ring).collect();
+    let (mut rings, widths): (Vec<Ring>, Vec<f32>) = of_ring.into_par_iter().map(ring).unzip();
     rings.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let steps = rings.windows(2).map(|pair| pair[1].elevation_rad - pair[0].elevation_rad);
     let [step, width] =
@@ -199,15 +200,20 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
     (MIN_STEP_RAD < step && width < MAX_SPREAD * step).then_some(rings)
 }
 
-/// Returns true if the ranges of some rings vary, as those of things around a scanner do.
-fn have_variation(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
-    let is_varied = |ring: &&Ring| {
-        let directions = ring.points.iter().filter_map(|point| directions[*point as usize]);
-        let ranges: Vec<f32> = directions.map(|direction| direction.range).collect();
-        let [low, median, high] = [0.01, 0.5, 0.99].map(|part| sampled_quantile(&ranges, part));
-        MIN_VARIATION * median < high - low
+/// Returns true if the ranges of some rings jump, or lack some rays, as those of things around a scanner do.
+fn have_jumps(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
+    let has_jump = |ring: &&Ring| {
+        let seen = ring.points.iter().filter_map(|point| directions[*point as usize]);
+        let ranges: Vec<f32> = seen.map(|direction| direction.range).collect();
+        let is_jump = |four: &[f32]| {
+            let [before, jump, after] = [0, 1, 2].map(|i| (four[i + 1] - four[i]).abs());
+            MIN_JUMP * four[1].min(four[2]) < jump && MIN_JUMP_RATIO * before.max(after) < jump
+        };
+        let turns = ring.azimuths.windows(2).map(|pair| pair[1] - pair[0]);
+        let max_turn = MIN_GAP * sampled_quantile(&turns.clone().collect::<Vec<_>>(), 0.5);
+        ranges.windows(4).any(is_jump) || turns.into_iter().any(|turn| max_turn < turn)
     };
-    MIN_VARIED * rings.len() as f32 <= rings.iter().filter(is_varied).count() as f32
+    MIN_WITH_JUMPS * rings.len() as f32 <= rings.iter().filter(has_jump).count() as f32
 }
 
 /// Returns the rings of each `step`-th point by a column of the file.
@@ -306,15 +312,15 @@ mod tests {
     const N_RINGS: usize = 16;
     const N_COLUMNS: usize = 400;
 
-    /// The points of a scanner 2 above the ground inside walls 5 to 25 away, laser by laser. Each laser is `lift` times its
-    /// number above the middle of the scanner.
+    /// The points of a scanner 2 above the ground inside walls 5 to 25 away, before which a pillar stands, laser by laser.
+    /// Each laser is `lift` times its number above the middle of the scanner.
     fn scan(lift: f32) -> PointCloud {
         let point = |i: usize| {
             let (ring, column) = (i / N_COLUMNS, i % N_COLUMNS);
             let (sin, cos) = (TAU * column as f32 / N_COLUMNS as f32).sin_cos();
             let elevation = (2.0 * ring as f32 - 20.3).to_radians();
             let slope = elevation.tan();
-            let to_wall = 15.0 + 10.0 * sin;
+            let to_wall = if (40..50).contains(&column) { 4.0 } else { 15.0 + 10.0 * sin };
             let level = if slope < 0.0 { (2.0 / -slope).min(to_wall) } else { to_wall };
             Vec3::new(level * cos, level * sin, level * slope + lift * ring as f32)
         };
@@ -412,7 +418,8 @@ mod tests {
         };
         let pillar: Vec<Vec3> = (0..9000).map(around).collect();
         let sphere: Vec<Vec3> = pillar.iter().map(|point| point.normalize()).collect();
-        for solid in [pillar, sphere] {
+        let ellipsoid = sphere.iter().map(|point| *point * Vec3::new(1.2, 1.0, 1.0)).collect();
+        for solid in [pillar, sphere, ellipsoid] {
             assert!(find(&PointCloud::from_positions(solid)).is_none());
         }
         let circle =
