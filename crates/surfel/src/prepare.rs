@@ -150,10 +150,10 @@ fn prepared(
     let mut preparation = Preparation {
         denoise: settings.preparation.denoise.unwrap_or(Denoise::Off),
         duplicates: settings.preparation.duplicates.unwrap_or(Duplicates::Keep),
+        mixed_pixels: settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep),
         ..settings.preparation(seed)
     };
     if !columns.normals && !columns.radii && !columns.variation {
-        preparation.mixed_pixels = settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep);
         return without_estimates(cloud, &preparation, progress);
     }
     preparation.keep_variation = columns.variation;
@@ -358,5 +358,7 @@ mod tests {
         assert_eq!(prepared(Some(MixedPixels::Drop), all), (190, true));
         assert_eq!(prepared(Some(MixedPixels::Keep), None), (200, false));
         assert_eq!(prepared(None, all), (200, false));
+        // Nor are they beside normals and radii.
+        assert_eq!(prepare_with(two_walls(), |_| ()).0.cloud.len(), 200);
     }
 }

@@ -101,7 +101,7 @@ settings! {
         /// least 0.15 of the spacing, and wires), on or off [default: auto, off for surfel prepare].
         denoise: Denoise, OneOf(DENOISE), "WHEN";
         /// Points in the air where the range of a scan jumps, as the grids of E57, PTX and PCD files tell: drop or keep. surfel
-        /// prepare drops them only if it adds normals or radii, or if this is given.
+        /// prepare drops them only if this is given.
         mixed_pixels: MixedPixels = MixedPixels::default(), OneOf(MIXED_PIXELS), "CHOICE";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
