@@ -172,7 +172,7 @@ pub fn find_shapes<'a>(
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
-    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
+    let grids = if preparation.free_space { ScanGrids::new(cloud, progress)? } else { None };
     let free_space = match &grids {
         Some(grids) => FreeSpace::new(grids, &cloud.positions, progress)?,
         None => FreeSpace::default(),

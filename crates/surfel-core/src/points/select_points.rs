@@ -48,7 +48,7 @@ pub(crate) fn select(
     let (mut cloud, report) =
         clean(cloud, preparation.duplicates, &preparation.kept_noise, progress)?;
     if preparation.mixed_pixels == MixedPixels::Drop
-        && let Some(kept) = without_mixed_pixels(&cloud)
+        && let Some(kept) = without_mixed_pixels(&cloud, progress)?
     {
         let n_mixed = cloud.len() - kept.len();
         let line = format!("{} between two surfaces dropped", counted(n_mixed, "mixed pixel"));

@@ -59,8 +59,7 @@ impl<'a> FreeSpace<'a> {
     pub fn new(grids: &'a ScanGrids, positions: &[Vec3], progress: &dyn Progress) -> Result<Self> {
         let mut scans = Vec::new();
         for grid in grids.scans.iter().flatten() {
-            progress.check()?;
-            scans.extend(SeenScan::new(grid, positions));
+            scans.extend(SeenScan::new(grid, positions, progress)?);
         }
         Ok(Self { scans })
     }
@@ -174,7 +173,7 @@ mod tests {
         let tree = KdTree::new(&cloud.positions, &NoProgress).unwrap();
         let shape = PointShape { structure: Structure::Surface, normal: Vec3::X, radius: 0.5 };
         let mut shapes = vec![shape; cloud.len()];
-        let grids = ScanGrids::new(cloud);
+        let grids = ScanGrids::new(cloud, &NoProgress).unwrap();
         let free_space = grids.as_ref().map_or_else(FreeSpace::default, |grids| {
             FreeSpace::new(grids, &cloud.positions, &NoProgress).unwrap()
         });

@@ -1,9 +1,11 @@
 //! Scans as ranges along rays: the space that a scanner saw through.
 
+use crate::error::Result;
 use crate::math::{DVec3, Vec3};
 use crate::points::scan::grid_rays::GridRays;
 use crate::points::scan::scan_grid::ScanGrid;
 use crate::points::structure::point_shape::{PointShape, Structure};
+use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Maximum distance, in rows and columns, of the rays that are looked at.
@@ -47,19 +49,31 @@ pub struct FreeRay {
 impl<'a> SeenScan<'a> {
     /// Returns the ranges of a scan; `None` if the directions of rays without a point are not known, or if so many are
     /// absent that points were left out of the scan since.
-    pub fn new(grid: &'a ScanGrid, positions: &[Vec3]) -> Option<Self> {
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn new(
+        grid: &'a ScanGrid,
+        positions: &[Vec3],
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>> {
+        progress.check()?;
         if !grid.is_dense() {
-            return None;
+            return Ok(None);
         }
-        let rays = GridRays::new(grid, positions)?;
+        progress.check()?;
+        let Some(rays) = GridRays::new(grid, positions) else { return Ok(None) };
+        progress.check()?;
         let mut ranges = vec![f32::INFINITY; grid.n_rows * grid.n_columns];
         for ([row, column], point) in grid.cells() {
             ranges[row * grid.n_columns + column] = positions[point].distance(grid.station);
         }
+        progress.check()?;
         let mut is_near_jump = jumps(&ranges, grid.n_columns);
         is_near_jump.par_chunks_mut(grid.n_columns).for_each(|row| dilate(row, 1));
         (0..grid.n_columns).for_each(|column| dilate(&mut is_near_jump[column..], grid.n_columns));
-        Some(Self { grid, rays, ranges, is_near_jump })
+        Ok(Some(Self { grid, rays, ranges, is_near_jump }))
     }
 
     /// Returns the distance between neighbouring rays on a surface with this normal.
@@ -214,15 +228,21 @@ mod tests {
     use super::*;
     use crate::points::scan::scan_grid::ScanGrids;
     use crate::points::scan::scan_grid::tests::scan;
+    use crate::progress::NoProgress;
 
     fn disc(radius: f32) -> PointShape {
         PointShape { structure: Structure::Surface, normal: Vec3::X, radius }
     }
 
+    fn grid(cloud: &crate::points::PointCloud) -> ScanGrid {
+        let grids = ScanGrids::new(cloud, &NoProgress).unwrap();
+        grids.unwrap().scans.pop().unwrap().unwrap()
+    }
+
     /// Returns the free rays of the disc at a row and column of a scan.
     fn free_rays(cloud: &crate::points::PointCloud, cell: [isize; 2], radius: f32) -> Vec<FreeRay> {
-        let grid = ScanGrids::new(cloud).unwrap().scans.pop().unwrap().unwrap();
-        let seen = SeenScan::new(&grid, &cloud.positions).unwrap();
+        let grid = grid(cloud);
+        let seen = SeenScan::new(&grid, &cloud.positions, &NoProgress).unwrap().unwrap();
         let point = grid.point(cell[0], cell[1]).unwrap();
         seen.free_rays(cloud.positions[point], &disc(radius))
     }
@@ -253,8 +273,8 @@ mod tests {
     #[test]
     fn radii_are_limited_by_the_distance_between_rays() {
         let cloud = wall(|_| false);
-        let grid = ScanGrids::new(&cloud).unwrap().scans.pop().unwrap().unwrap();
-        let seen = SeenScan::new(&grid, &cloud.positions).unwrap();
+        let grid = grid(&cloud);
+        let seen = SeenScan::new(&grid, &cloud.positions, &NoProgress).unwrap().unwrap();
         let mut shapes = vec![disc(1.0); cloud.len()];
         shapes[7].structure = Structure::Line;
         shapes[8].radius = 0.01;
@@ -267,8 +287,8 @@ mod tests {
     #[test]
     fn thinned_scans_tell_nothing() {
         let cloud = wall(|column| column % 2 == 1);
-        let grid = ScanGrids::new(&cloud).unwrap().scans.pop().unwrap().unwrap();
-        assert!(SeenScan::new(&grid, &cloud.positions).is_none());
+        let grid = grid(&cloud);
+        assert!(SeenScan::new(&grid, &cloud.positions, &NoProgress).unwrap().is_none());
     }
 
     #[test]

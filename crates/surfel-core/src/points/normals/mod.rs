@@ -4,4 +4,5 @@
 
 pub mod planes;
 pub mod jets;
+pub mod spanning_tree;
 pub mod orient;

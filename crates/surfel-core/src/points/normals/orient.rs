@@ -1,25 +1,17 @@
 //! Orientation of normals, which decides the front side of a surface.
 
+use super::spanning_tree::flips_by_spanning_tree;
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
-use crate::points::neighbors::{KdTree, Neighborhood};
 use crate::points::scan::scan_angle::SightLines;
 use crate::points::up::is_terrain;
 use crate::points::{PointCloud, is_valid_position};
 use crate::progress::Progress;
-use crate::words::counted;
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
-
-/// Number of neighbours that each point is linked to. Each link takes about 10 bytes per point for a while.
-const DEGREE: usize = 8;
 
 /// Minimum fraction of the points whose station is known.
 const MIN_WITH_STATION: f64 = 0.99;
-
-/// Marks an unused link.
-const NONE: u32 = u32::MAX;
 
 /// The rule that decides the sign of estimated normals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,9 +50,12 @@ pub fn orient(
     match orientation {
         Orientation::None => Ok(normals),
         Orientation::Auto => {
-            let chosen = choose_orientation(cloud, &normals);
+            let (chosen, sights) = choose_orientation(cloud, &normals, progress)?;
             progress.choice(&format!("front sides {}", chosen.reason()), &["orient"]);
-            orient(cloud, normals, chosen, progress)
+            match chosen {
+                Orientation::ScanAngle => Ok(turn_to_scanner(normals, sights.as_ref())),
+                _ => orient(cloud, normals, chosen, progress),
+            }
         }
         Orientation::Viewpoint(world_viewpoint) => {
             let viewpoint = world_viewpoint - cloud.origin;
@@ -70,12 +65,13 @@ pub fn orient(
         }
         Orientation::Station => Ok(turn_to_stations(cloud, normals)),
         Orientation::ScanAngle => {
-            let sights = SightLines::new(cloud);
-            let toward = |i: usize| sights.as_ref().map_or(DVec3::Z, |s| s.toward_scanner(i));
-            Ok(flip_if(normals, |i, normal| toward(i).dot(normal.as_dvec3()) < 0.0))
+            Ok(turn_to_scanner(normals, SightLines::new(cloud, progress)?.as_ref()))
         }
         Orientation::Up => Ok(flip_if(normals, |_, normal| normal.z < 0.0)),
-        Orientation::SpanningTree => by_spanning_tree(&cloud.positions, normals, progress),
+        Orientation::SpanningTree => {
+            let flips = flips_by_spanning_tree(&cloud.positions, &normals, progress)?;
+            Ok(flip_if(normals, |i, _| flips[i]))
+        }
     }
 }
 
@@ -89,6 +85,12 @@ fn turn_to_stations(cloud: &PointCloud, normals: Vec<Vec3>) -> Vec<Vec3> {
     })
 }
 
+/// Flips the normals that point away from an airborne scanner, or down if its lines of sight are not known.
+fn turn_to_scanner(normals: Vec<Vec3>, sights: Option<&SightLines>) -> Vec<Vec3> {
+    let toward = |i: usize| sights.map_or(DVec3::Z, |sights| sights.toward_scanner(i));
+    flip_if(normals, |i, normal| toward(i).dot(normal.as_dvec3()) < 0.0)
+}
+
 /// Returns true if the positions of all stations of a cloud are known, and the station of nearly all points.
 pub(crate) fn has_stations(cloud: &PointCloud) -> bool {
     let is_known = cloud.stations.iter().all(|station| station.position.is_some());
@@ -100,17 +102,25 @@ pub(crate) fn has_stations(cloud: &PointCloud) -> bool {
     MIN_WITH_STATION * cloud.len() as f64 <= n_with_station as f64
 }
 
-/// Returns the most trusted orientation that the columns and the shape of a cloud allow.
-fn choose_orientation(cloud: &PointCloud, normals: &[Vec3]) -> Orientation {
+/// Returns the most trusted orientation that the columns and the shape of a cloud allow, with its lines of sight if it goes
+/// by these.
+fn choose_orientation<'a>(
+    cloud: &'a PointCloud,
+    normals: &[Vec3],
+    progress: &dyn Progress,
+) -> Result<(Orientation, Option<SightLines<'a>>)> {
     if has_stations(cloud) {
-        Orientation::Station
-    } else if SightLines::new(cloud).is_some() {
+        return Ok((Orientation::Station, None));
+    }
+    let sights = SightLines::new(cloud, progress)?;
+    let chosen = if sights.is_some() {
         Orientation::ScanAngle
     } else if is_terrain(&cloud.positions) && is_mostly_level(cloud, normals) {
         Orientation::Up
     } else {
         Orientation::SpanningTree
-    }
+    };
+    Ok((chosen, sights))
 }
 
 /// Returns true if more than half of the normals are within 60 degrees of the vertical. Terrestrial scans are mostly
@@ -129,173 +139,6 @@ fn flip_if(mut normals: Vec<Vec3>, is_backward: impl Fn(usize, Vec3) -> bool + S
         }
     });
     normals
-}
-
-fn by_spanning_tree(
-    positions: &[Vec3],
-    normals: Vec<Vec3>,
-    progress: &dyn Progress,
-) -> Result<Vec<Vec3>> {
-    let links = KdTree::new(positions, progress)?.map(
-        Neighborhood::Nearest(DEGREE),
-        progress,
-        |_, neighbors| {
-            let mut links = [NONE; DEGREE];
-            links.iter_mut().zip(neighbors).for_each(|(link, neighbor)| *link = neighbor.index);
-            links
-        },
-    )?;
-    let edges = sorted_edges(&links, &normals, progress)?;
-    progress.begin("orient", edges.len() as u64);
-    let mut components = SignedUnionFind::new(normals.len());
-    for (edge_idx, &edge) in edges.iter().enumerate() {
-        if edge_idx % (1 << 16) == 0 {
-            progress.check()?;
-            progress.advance((1 << 16).min(edges.len() - edge_idx) as u64);
-        }
-        let (a, b) = ends(edge, &links);
-        components.join(a, b, normals[a as usize].dot(normals[b as usize]) < 0.0);
-    }
-    drop((edges, links));
-    let members = components.members(progress)?;
-    let (backward, n_components) = backward_components(positions, &normals, &members, progress)?;
-    let components = counted(n_components, "connected component");
-    progress.note(&format!("normals oriented along a spanning tree in {components}"));
-    Ok(flip_if(normals, |i, _| members[i].is_flipped != backward.contains(&members[i].root)))
-}
-
-/// Returns the edges of the neighbour graph as `weight << 40 | link`, the most parallel first.
-fn sorted_edges(
-    links: &[[u32; DEGREE]],
-    normals: &[Vec3],
-    progress: &dyn Progress,
-) -> Result<Vec<u64>> {
-    progress.check()?;
-    let edges_of = |point: usize| {
-        (0..DEGREE).filter_map(move |link| {
-            let other = links[point][link];
-            let is_listed_there =
-                (other as usize) < point && links[other as usize].contains(&(point as u32));
-            if other == NONE || is_listed_there {
-                return None;
-            }
-            let weight = 1.0 - normals[point].dot(normals[other as usize]).abs();
-            let steps = (weight.max(0.0) * (1 << 23) as f32) as u64;
-            Some(steps << 40 | (point * DEGREE + link) as u64)
-        })
-    };
-    let mut edges: Vec<u64> = (0..links.len()).into_par_iter().flat_map_iter(edges_of).collect();
-    progress.check()?;
-    edges.par_sort_unstable();
-    Ok(edges)
-}
-
-fn ends(edge: u64, links: &[[u32; DEGREE]]) -> (u32, u32) {
-    let link = (edge & ((1 << 40) - 1)) as usize;
-    ((link / DEGREE) as u32, links[link / DEGREE][link % DEGREE])
-}
-
-/// A point as a member of a connected component.
-#[derive(Clone, Copy)]
-struct Member {
-    /// The component's root point.
-    root: u32,
-    /// True if the point's normal is opposite to that of the root.
-    is_flipped: bool,
-}
-
-/// A union-find structure whose members have a sign relative to their root, so that signs need no traversal of the
-/// spanning tree.
-struct SignedUnionFind {
-    /// Parents as `parent << 1 | is_flipped`.
-    parents: Vec<u64>,
-    sizes: Vec<u32>,
-}
-
-impl SignedUnionFind {
-    fn new(n_points: usize) -> Self {
-        Self { parents: (0..n_points as u64).map(|i| i << 1).collect(), sizes: vec![1; n_points] }
-    }
-
-    fn find(&mut self, point: u32) -> Member {
-        let (mut at, mut is_flipped) = (point as usize, false);
-        loop {
-            let parent = self.parents[at];
-            if (parent >> 1) as usize == at {
-                return Member { root: at as u32, is_flipped };
-            }
-            // Path halving: the parent becomes the grandparent, with both signs.
-            let above = self.parents[(parent >> 1) as usize];
-            let grandparent = above ^ (parent & 1);
-            self.parents[at] = grandparent;
-            is_flipped ^= grandparent & 1 == 1;
-            at = (grandparent >> 1) as usize;
-        }
-    }
-
-    fn members(&mut self, progress: &dyn Progress) -> Result<Vec<Member>> {
-        let mut members = Vec::with_capacity(self.parents.len());
-        for point in 0..self.parents.len() as u32 {
-            if point.is_multiple_of(1 << 16) {
-                progress.check()?;
-            }
-            members.push(self.find(point));
-        }
-        Ok(members)
-    }
-
-    fn join(&mut self, a: u32, b: u32, is_opposite: bool) {
-        let (a, b) = (self.find(a), self.find(b));
-        if a.root == b.root {
-            return;
-        }
-        let is_flipped = a.is_flipped ^ b.is_flipped ^ is_opposite;
-        let (above, below) = (a.root as usize, b.root as usize);
-        let (above, below) =
-            if self.sizes[above] < self.sizes[below] { (below, above) } else { (above, below) };
-        self.parents[below] = (above as u64) << 1 | u64::from(is_flipped);
-        self.sizes[above] += self.sizes[below];
-    }
-}
-
-/// Returns the roots of connected components whose normals must all be flipped, and the number of all components.
-fn backward_components(
-    positions: &[Vec3],
-    normals: &[Vec3],
-    members: &[Member],
-    progress: &dyn Progress,
-) -> Result<(HashSet<u32>, usize)> {
-    let mut components: HashMap<u32, Component> = HashMap::new();
-    for (point, member) in members.iter().enumerate() {
-        if point % (1 << 16) == 0 {
-            progress.check()?;
-        }
-        let new = Component { highest: point, ..Component::default() };
-        let component = components.entry(member.root).or_insert(new);
-        if positions[component.highest].z < positions[point].z {
-            component.highest = point;
-        }
-        component.sum += positions[point].as_dvec3();
-        component.n_points += 1;
-    }
-    let n_components = components.len();
-    let backward = components.into_iter().filter(|(_, component)| {
-        let sign = if members[component.highest].is_flipped { -1.0 } else { 1.0 };
-        let normal = sign * normals[component.highest].as_dvec3();
-        let outward =
-            positions[component.highest].as_dvec3() - component.sum / component.n_points as f64;
-        // At the top of a wall the normal is level.
-        let facing = if 0.2 < normal.z.abs() { normal.z } else { normal.dot(outward) };
-        facing < 0.0
-    });
-    Ok((backward.map(|(root, _)| root).collect(), n_components))
-}
-
-#[derive(Default)]
-struct Component {
-    highest: usize,
-    sum: DVec3,
-    n_points: usize,
 }
 
 impl Orientation {
@@ -422,30 +265,33 @@ mod tests {
 
     #[test]
     fn the_most_trusted_orientation_is_chosen() {
+        let chosen = |cloud: &PointCloud, normals: &[Vec3]| {
+            choose_orientation(cloud, normals, &NoProgress).unwrap().0
+        };
         let ground = |i: usize| Vec3::new((i % 100) as f32, (i / 100) as f32, 0.0);
         let terrain = PointCloud::from_positions((0..10_000).map(ground).collect());
         let normals = vec![Vec3::NEG_Z; terrain.len()];
-        assert_eq!(choose_orientation(&terrain, &normals), Orientation::Up);
+        assert_eq!(chosen(&terrain, &normals), Orientation::Up);
         let walls = vec![Vec3::X; terrain.len()];
-        assert_eq!(choose_orientation(&terrain, &walls), Orientation::SpanningTree);
+        assert_eq!(chosen(&terrain, &walls), Orientation::SpanningTree);
         let mut flight = terrain.clone();
         let angles = Values::F32((0..10_000).map(|i| (i % 100) as f32 - 50.0).collect());
         flight.scalars.push(Scalar { name: SCAN_ANGLE.into(), values: angles });
-        assert_eq!(choose_orientation(&flight, &normals), Orientation::ScanAngle);
+        assert_eq!(chosen(&flight, &normals), Orientation::ScanAngle);
         let station = |position| ScanStation { position, ..ScanStation::default() };
         let scan = PointCloud { stations: vec![station(Some(DVec3::Z))], ..flight.clone() };
-        assert_eq!(choose_orientation(&scan, &normals), Orientation::Station);
+        assert_eq!(chosen(&scan, &normals), Orientation::Station);
         // A point without a station comes first.
         let of_point = |i: usize| if i == 0 { u16::MAX } else { 0 };
         let indices = Values::U16((0..scan.len()).map(of_point).collect());
         let mut merged = scan;
         merged.stations.push(station(Some(DVec3::X)));
         merged.scalars.push(Scalar { name: STATION.into(), values: indices });
-        assert_eq!(choose_orientation(&merged, &normals), Orientation::Station);
+        assert_eq!(chosen(&merged, &normals), Orientation::Station);
         let unposed = PointCloud { stations: vec![station(None)], ..flight };
-        assert_eq!(choose_orientation(&unposed, &normals), Orientation::ScanAngle);
+        assert_eq!(chosen(&unposed, &normals), Orientation::ScanAngle);
         let (balls, mixed) = balls();
-        assert_eq!(choose_orientation(&balls, &mixed), Orientation::SpanningTree);
+        assert_eq!(chosen(&balls, &mixed), Orientation::SpanningTree);
         let found = orient(&balls, mixed, Orientation::Auto, &NoProgress).unwrap();
         assert_eq!(Some(found), balls.normals);
     }

@@ -6,6 +6,7 @@
 use super::scan_grid::{ScanGrid, ScanGrids};
 use crate::math::{DVec3, Vec3, median};
 use crate::points::{PointCloud, ScanStation};
+use crate::progress::NoProgress;
 use std::f64::consts::{PI, TAU};
 
 /// Number of rays with points that the steps are found from.
@@ -64,7 +65,11 @@ pub fn locate_stations(cloud: &mut PointCloud) -> usize {
     for &scan in &unknown {
         cloud.stations[scan].position = Some(DVec3::ZERO);
     }
-    let grids = if unknown.is_empty() { None } else { ScanGrids::new(cloud) };
+    let grids = match unknown.is_empty() {
+        true => None,
+        // Nothing cancels it.
+        false => ScanGrids::new(cloud, &NoProgress).unwrap_or_default(),
+    };
     let has_rays = |scan: usize| {
         let grid = grids.as_ref().and_then(|grids| grids.scans[scan].as_ref());
         grid.is_some_and(|grid| GridRays::new(grid, &cloud.positions).is_some())
@@ -258,7 +263,7 @@ mod tests {
     use crate::points::scan::scan_grid::tests::scan;
 
     fn rays(cloud: &PointCloud) -> Option<(ScanGrid, GridRays)> {
-        let grid = ScanGrids::new(cloud)?.scans.pop()??;
+        let grid = ScanGrids::new(cloud, &NoProgress).unwrap()?.scans.pop()??;
         let rays = GridRays::new(&grid, &cloud.positions)?;
         Some((grid, rays))
     }
@@ -300,7 +305,7 @@ mod tests {
         let range = |row: usize, column: usize| Some(2.0 + ((row * column) % 5) as f32);
         let mut cloud = scan(40, 40, range);
         cloud.stations[0].position = None;
-        assert!(ScanGrids::new(&cloud).is_none());
+        assert!(ScanGrids::new(&cloud, &NoProgress).unwrap().is_none());
         assert_eq!(locate_stations(&mut cloud), 1);
         assert_eq!(cloud.stations[0].position, Some(DVec3::ZERO));
         let elsewhere = DVec3::new(0.5, -0.5, 0.2);

@@ -6,8 +6,10 @@
 //! lines between the points beyond decide.
 
 use super::scan_grid::{ScanGrid, ScanGrids};
+use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
+use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Minimum cosine of the angle between a ray and the line to the next point: that of 10 degrees.
@@ -30,8 +32,15 @@ pub enum MixedPixels {
 }
 
 /// Returns the points of a cloud that are no mixed pixels; `None` if it has none, or no grids.
-pub fn without_mixed_pixels(cloud: &PointCloud) -> Option<Vec<u32>> {
-    let grids = ScanGrids::new(cloud)?;
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn without_mixed_pixels(
+    cloud: &PointCloud,
+    progress: &dyn Progress,
+) -> Result<Option<Vec<u32>>> {
+    let Some(grids) = ScanGrids::new(cloud, progress)? else { return Ok(None) };
     let mut mixed: Vec<u32> = Vec::new();
     for grid in grids.scans.iter().flatten() {
         let cells: Vec<([usize; 2], usize)> = grid.cells().collect();
@@ -44,14 +53,17 @@ pub fn without_mixed_pixels(cloud: &PointCloud) -> Option<Vec<u32>> {
             });
             lines.iter().any(GridLine::is_mixed)
         };
-        mixed.par_extend(cells.par_iter().filter(is_mixed).map(|(_, point)| *point as u32));
+        for cells in cells.chunks(1 << 20) {
+            progress.check()?;
+            mixed.par_extend(cells.par_iter().filter(is_mixed).map(|(_, point)| *point as u32));
+        }
     }
     if mixed.is_empty() {
-        return None;
+        return Ok(None);
     }
     mixed.par_sort_unstable();
     let is_kept = |point: &u32| mixed.binary_search(point).is_err();
-    Some((0..cloud.len() as u32).filter(is_kept).collect())
+    Ok(Some((0..cloud.len() as u32).filter(is_kept).collect()))
 }
 
 /// The points before and after a point along a row or a column of a grid.
@@ -128,10 +140,12 @@ mod tests {
 
     use super::*;
     use crate::points::scan::scan_grid::tests::scan;
+    use crate::progress::NoProgress;
 
     /// Returns the ranges of the points that are dropped.
     fn dropped(cloud: &PointCloud) -> Vec<f32> {
-        let Some(kept) = without_mixed_pixels(cloud) else { return Vec::new() };
+        let kept = without_mixed_pixels(cloud, &NoProgress).unwrap();
+        let Some(kept) = kept else { return Vec::new() };
         let all = 0..cloud.len() as u32;
         let dropped = all.filter(|point| kept.binary_search(point).is_err());
         dropped.map(|point| cloud.positions[point as usize].length().round()).collect()

@@ -4,8 +4,10 @@
 //! a flight line the angle grows linearly across the flight, so a regression over the points there gives the side,
 //! whatever the order of the points (after `scanline_orient_normals` of CGAL, which needs the order of scan lines).
 
+use crate::error::Result;
 use crate::math::{DVec2, DVec3};
 use crate::points::{PointCloud, Values, is_valid_position};
+use crate::progress::Progress;
 use std::collections::HashMap;
 
 /// Name of the scalar column of scan angles in degrees.
@@ -35,8 +37,12 @@ pub struct SightLines<'a> {
 
 impl<'a> SightLines<'a> {
     /// Finds the side of each flight line; `None` for a cloud without scan angles or with the same one everywhere.
-    pub fn new(cloud: &'a PointCloud) -> Option<Self> {
-        let angles = cloud.scalar(SCAN_ANGLE)?;
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn new(cloud: &'a PointCloud, progress: &dyn Progress) -> Result<Option<Self>> {
+        let Some(angles) = cloud.scalar(SCAN_ANGLE) else { return Ok(None) };
         let bounds = cloud.bounds();
         let size = (bounds.max - bounds.min).as_dvec3().truncate();
         let mut sights = Self {
@@ -49,11 +55,14 @@ impl<'a> SightLines<'a> {
             across_of_lines: HashMap::new(),
         };
         if !(0.0 < sights.cell_size && sights.cell_size.is_finite()) {
-            return None;
+            return Ok(None);
         }
         let mut cells: HashMap<(u32, u8, u8), Regression> = HashMap::new();
         let mut lines: HashMap<u32, Regression> = HashMap::new();
         for point in (0..cloud.len()).filter(|point| is_valid_position(cloud.positions[*point])) {
+            if point.is_multiple_of(1 << 16) {
+                progress.check()?;
+            }
             let Some(angle) = sights.angle_deg(point) else { continue };
             let key = sights.cell(point);
             let offset = sights.offset(point);
@@ -63,7 +72,7 @@ impl<'a> SightLines<'a> {
         }
         sights.across = directions(&cells);
         sights.across_of_lines = directions(&lines);
-        (!sights.across_of_lines.is_empty()).then_some(sights)
+        Ok((!sights.across_of_lines.is_empty()).then_some(sights))
     }
 
     /// Returns the unit vector from a point to the scanner: straight up if its flight line has no known side.
@@ -156,6 +165,11 @@ mod tests {
     use super::*;
     use crate::math::{Random, Vec3};
     use crate::points::Scalar;
+    use crate::progress::NoProgress;
+
+    fn sights(cloud: &PointCloud) -> Option<SightLines<'_>> {
+        SightLines::new(cloud, &NoProgress).unwrap()
+    }
 
     /// Returns points of two flights 300 m over rough ground, the first to the north and the second to the north-east,
     /// in random order, and the position of the scanner at each.
@@ -185,7 +199,7 @@ mod tests {
     #[test]
     fn lines_of_sight_point_to_the_flight_line_whatever_the_order_of_the_points() {
         let (cloud, scanners) = flights();
-        let sights = SightLines::new(&cloud).unwrap();
+        let sights = sights(&cloud).unwrap();
         for (point, scanner) in scanners.iter().enumerate() {
             let expected = (scanner - cloud.positions[point].as_dvec3()).normalize();
             let found = sights.toward_scanner(point);
@@ -203,14 +217,14 @@ mod tests {
 
     #[test]
     fn scan_angles_without_a_slope_tell_nothing() {
-        assert!(SightLines::new(&with_angles(vec![0.0; 400])).is_none());
-        assert!(SightLines::new(&with_angles(vec![f32::NAN; 400])).is_none());
+        assert!(sights(&with_angles(vec![0.0; 400])).is_none());
+        assert!(sights(&with_angles(vec![f32::NAN; 400])).is_none());
         let noise = (0..400).map(|i| ((i * 7919) % 13) as f32).collect();
-        assert!(SightLines::new(&with_angles(noise)).is_none());
+        assert!(sights(&with_angles(noise)).is_none());
         let cloud = with_angles((0..400).map(|i| (i % 20) as f32).collect());
-        assert!(SightLines::new(&cloud).is_some());
-        assert!(SightLines::new(&PointCloud::default()).is_none());
+        assert!(sights(&cloud).is_some());
+        assert!(sights(&PointCloud::default()).is_none());
         let coincident = PointCloud { positions: vec![Vec3::ONE; 400], ..cloud };
-        assert!(SightLines::new(&coincident).is_none());
+        assert!(sights(&coincident).is_none());
     }
 }

@@ -1,8 +1,10 @@
 //! Grids of scans: the rays of a scanner in rows and columns, with the point that each measured.
 
+use crate::error::Result;
 use crate::math::{DQuat, DVec3, Vec3};
 use crate::points::cloud::point_cloud::ScanOfPoint;
 use crate::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, Values, is_valid_position};
+use crate::progress::Progress;
 
 /// Marks a ray without a point.
 pub const NO_POINT: u32 = u32::MAX;
@@ -40,10 +42,17 @@ struct Extent {
 
 impl ScanGrids {
     /// Returns the grids of the scans whose station is known; `None` if there are none.
-    pub fn new(cloud: &PointCloud) -> Option<Self> {
-        let indices = [cloud.scalar(ROW_INDEX)?, cloud.scalar(COLUMN_INDEX)?];
-        let scan_of = cloud.scan_of_point()?;
-        let extents = extents(cloud, indices, &scan_of);
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn new(cloud: &PointCloud, progress: &dyn Progress) -> Result<Option<Self>> {
+        let columns = [cloud.scalar(ROW_INDEX), cloud.scalar(COLUMN_INDEX)];
+        let ([Some(rows), Some(columns)], Some(scan_of)) = (columns, cloud.scan_of_point()) else {
+            return Ok(None);
+        };
+        let indices = [rows, columns];
+        let extents = extents(cloud, indices, &scan_of, progress)?;
         let grid = |(station, extent): (&crate::points::ScanStation, Extent)| {
             let position = (station.position? - cloud.origin).as_vec3();
             ScanGrid::empty(position, station.rotation, &extent)
@@ -51,6 +60,7 @@ impl ScanGrids {
         let mut scans: Vec<Option<ScanGrid>> =
             cloud.stations.iter().zip(extents.iter().copied()).map(grid).collect();
         for point in 0..cloud.len() {
+            check_each(point, progress)?;
             let Some(cell) = cell(cloud, indices, point) else { continue };
             let scan = scan_of.get(point);
             if let (Some(Some(grid)), Some(extent)) = (scans.get_mut(scan), extents.get(scan)) {
@@ -60,7 +70,7 @@ impl ScanGrids {
                 *slot = (*slot).min(point as u32);
             }
         }
-        scans.iter().any(Option::is_some).then_some(Self { scans })
+        Ok(scans.iter().any(Option::is_some).then_some(Self { scans }))
     }
 }
 
@@ -123,10 +133,16 @@ fn cell(cloud: &PointCloud, indices: [&Values; 2], point: usize) -> Option<[u32;
 }
 
 /// Returns the extent of the grid of each scan.
-fn extents(cloud: &PointCloud, indices: [&Values; 2], scan_of: &ScanOfPoint) -> Vec<Extent> {
+fn extents(
+    cloud: &PointCloud,
+    indices: [&Values; 2],
+    scan_of: &ScanOfPoint,
+    progress: &dyn Progress,
+) -> Result<Vec<Extent>> {
     let none = Extent { first: [u32::MAX; 2], last: [0; 2], n_points: 0 };
     let mut extents = vec![none; cloud.stations.len()];
     for point in 0..cloud.len() {
+        check_each(point, progress)?;
         let Some(cell) = cell(cloud, indices, point) else { continue };
         if let Some(extent) = extents.get_mut(scan_of.get(point)) {
             for (axis, index) in cell.into_iter().enumerate() {
@@ -136,7 +152,12 @@ fn extents(cloud: &PointCloud, indices: [&Values; 2], scan_of: &ScanOfPoint) -> 
             extent.n_points += 1;
         }
     }
-    extents
+    Ok(extents)
+}
+
+/// Checks for cancellation at some of the points.
+fn check_each(point: usize, progress: &dyn Progress) -> Result<()> {
+    if point.is_multiple_of(1 << 16) { progress.check() } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -145,6 +166,7 @@ pub(crate) mod tests {
 
     use super::*;
     use crate::points::{STATION, Scalar, ScanStation};
+    use crate::progress::NoProgress;
 
     /// Returns a scan from the origin of a grid of rays 0.01 apart along +X, at the distances that `range` tells by row
     /// and column.
@@ -175,7 +197,7 @@ pub(crate) mod tests {
     }
 
     fn single(cloud: &PointCloud) -> Option<ScanGrid> {
-        ScanGrids::new(cloud)?.scans.pop()?
+        ScanGrids::new(cloud, &NoProgress).unwrap()?.scans.pop()?
     }
 
     #[test]
@@ -226,6 +248,6 @@ pub(crate) mod tests {
         cloud.stations.push(cloud.stations[0].clone());
         let stations = vec![u16::MAX; 16];
         cloud.scalars.push(Scalar { name: STATION.into(), values: Values::U16(stations) });
-        assert!(ScanGrids::new(&cloud).is_none());
+        assert!(single(&cloud).is_none());
     }
 }

@@ -61,7 +61,9 @@ pub fn find_sparse_walls(
         Ok(Wall::around(&tree, i, N_DEVIATIONS * noise))
     };
     let walls = (0..candidates.len()).into_par_iter().map(wall).collect::<Result<Vec<_>>>()?;
-    let confirmed: Vec<usize> = (0..walls.len()).filter(|i| is_confirmed(*i, &walls)).collect();
+    progress.check()?;
+    let confirmed: Vec<usize> =
+        (0..walls.len()).into_par_iter().filter(|i| is_confirmed(*i, &walls)).collect();
     let on_walls: Vec<Vec3> = confirmed.iter().map(|i| candidates[*i]).collect();
     let is_below = are_below_roofs(&on_walls, positions, typical_radius, shapes, progress)?;
     for (i, is_below) in confirmed.into_iter().zip(is_below) {

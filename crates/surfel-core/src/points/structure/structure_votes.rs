@@ -69,6 +69,7 @@ pub fn smoothed(
     let mut fractions: Vec<f32> =
         own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
     for _ in 0..N_ROUNDS {
+        progress.check()?;
         let mixed = |(own, voters): (&f32, &Voters)| {
             let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
             let n_voters = of_voters.clone().count().max(1) as f32;

@@ -1,0 +1,189 @@
+//! Signs of normals along a minimum spanning tree of the neighbour graph (Hoppe et al. 1992).
+
+use crate::error::Result;
+use crate::math::{DVec3, Vec3};
+use crate::points::neighbors::{KdTree, Neighborhood};
+use crate::progress::Progress;
+use crate::words::counted;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+
+/// Number of neighbours that each point is linked to. Each link takes about 10 bytes per point for a while.
+const DEGREE: usize = 8;
+
+/// Marks an unused link.
+const NONE: u32 = u32::MAX;
+
+/// Returns true for each normal that is to be flipped.
+///
+/// # Errors
+///
+/// Returns [`Error::TooManyPoints`](crate::Error::TooManyPoints) beyond 32-bit indices and
+/// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn flips_by_spanning_tree(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    progress: &dyn Progress,
+) -> Result<Vec<bool>> {
+    let links = KdTree::new(positions, progress)?.map(
+        Neighborhood::Nearest(DEGREE),
+        progress,
+        |_, neighbors| {
+            let mut links = [NONE; DEGREE];
+            links.iter_mut().zip(neighbors).for_each(|(link, neighbor)| *link = neighbor.index);
+            links
+        },
+    )?;
+    let edges = sorted_edges(&links, normals, progress)?;
+    progress.begin("orient", edges.len() as u64);
+    let mut components = SignedUnionFind::new(normals.len());
+    for (edge_idx, &edge) in edges.iter().enumerate() {
+        if edge_idx % (1 << 16) == 0 {
+            progress.check()?;
+            progress.advance((1 << 16).min(edges.len() - edge_idx) as u64);
+        }
+        let (a, b) = ends(edge, &links);
+        components.join(a, b, normals[a as usize].dot(normals[b as usize]) < 0.0);
+    }
+    drop((edges, links));
+    let members = components.members(progress)?;
+    let (backward, n_components) = backward_components(positions, normals, &members, progress)?;
+    let components = counted(n_components, "connected component");
+    progress.note(&format!("normals oriented along a spanning tree in {components}"));
+    let is_backward = |member: &Member| member.is_flipped != backward.contains(&member.root);
+    Ok(members.par_iter().map(is_backward).collect())
+}
+
+/// Returns the edges of the neighbour graph as `weight << 40 | link`, the most parallel first.
+fn sorted_edges(
+    links: &[[u32; DEGREE]],
+    normals: &[Vec3],
+    progress: &dyn Progress,
+) -> Result<Vec<u64>> {
+    progress.check()?;
+    let edges_of = |point: usize| {
+        (0..DEGREE).filter_map(move |link| {
+            let other = links[point][link];
+            let is_listed_there =
+                (other as usize) < point && links[other as usize].contains(&(point as u32));
+            if other == NONE || is_listed_there {
+                return None;
+            }
+            let weight = 1.0 - normals[point].dot(normals[other as usize]).abs();
+            let steps = (weight.max(0.0) * (1 << 23) as f32) as u64;
+            Some(steps << 40 | (point * DEGREE + link) as u64)
+        })
+    };
+    let mut edges: Vec<u64> = (0..links.len()).into_par_iter().flat_map_iter(edges_of).collect();
+    progress.check()?;
+    edges.par_sort_unstable();
+    Ok(edges)
+}
+
+fn ends(edge: u64, links: &[[u32; DEGREE]]) -> (u32, u32) {
+    let link = (edge & ((1 << 40) - 1)) as usize;
+    ((link / DEGREE) as u32, links[link / DEGREE][link % DEGREE])
+}
+
+/// A point as a member of a connected component.
+#[derive(Clone, Copy)]
+struct Member {
+    /// The component's root point.
+    root: u32,
+    /// True if the point's normal is opposite to that of the root.
+    is_flipped: bool,
+}
+
+/// A union-find structure whose members have a sign relative to their root, so that signs need no traversal of the
+/// spanning tree.
+struct SignedUnionFind {
+    /// Parents as `parent << 1 | is_flipped`.
+    parents: Vec<u64>,
+    sizes: Vec<u32>,
+}
+
+impl SignedUnionFind {
+    fn new(n_points: usize) -> Self {
+        Self { parents: (0..n_points as u64).map(|i| i << 1).collect(), sizes: vec![1; n_points] }
+    }
+
+    fn find(&mut self, point: u32) -> Member {
+        let (mut at, mut is_flipped) = (point as usize, false);
+        loop {
+            let parent = self.parents[at];
+            if (parent >> 1) as usize == at {
+                return Member { root: at as u32, is_flipped };
+            }
+            // Path halving: the parent becomes the grandparent, with both signs.
+            let above = self.parents[(parent >> 1) as usize];
+            let grandparent = above ^ (parent & 1);
+            self.parents[at] = grandparent;
+            is_flipped ^= grandparent & 1 == 1;
+            at = (grandparent >> 1) as usize;
+        }
+    }
+
+    fn members(&mut self, progress: &dyn Progress) -> Result<Vec<Member>> {
+        let mut members = Vec::with_capacity(self.parents.len());
+        for point in 0..self.parents.len() as u32 {
+            if point.is_multiple_of(1 << 16) {
+                progress.check()?;
+            }
+            members.push(self.find(point));
+        }
+        Ok(members)
+    }
+
+    fn join(&mut self, a: u32, b: u32, is_opposite: bool) {
+        let (a, b) = (self.find(a), self.find(b));
+        if a.root == b.root {
+            return;
+        }
+        let is_flipped = a.is_flipped ^ b.is_flipped ^ is_opposite;
+        let (above, below) = (a.root as usize, b.root as usize);
+        let (above, below) =
+            if self.sizes[above] < self.sizes[below] { (below, above) } else { (above, below) };
+        self.parents[below] = (above as u64) << 1 | u64::from(is_flipped);
+        self.sizes[above] += self.sizes[below];
+    }
+}
+
+/// Returns the roots of connected components whose normals must all be flipped, and the number of all components.
+fn backward_components(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    members: &[Member],
+    progress: &dyn Progress,
+) -> Result<(HashSet<u32>, usize)> {
+    let mut components: HashMap<u32, Component> = HashMap::new();
+    for (point, member) in members.iter().enumerate() {
+        if point % (1 << 16) == 0 {
+            progress.check()?;
+        }
+        let new = Component { highest: point, ..Component::default() };
+        let component = components.entry(member.root).or_insert(new);
+        if positions[component.highest].z < positions[point].z {
+            component.highest = point;
+        }
+        component.sum += positions[point].as_dvec3();
+        component.n_points += 1;
+    }
+    let n_components = components.len();
+    let backward = components.into_iter().filter(|(_, component)| {
+        let sign = if members[component.highest].is_flipped { -1.0 } else { 1.0 };
+        let normal = sign * normals[component.highest].as_dvec3();
+        let outward =
+            positions[component.highest].as_dvec3() - component.sum / component.n_points as f64;
+        // At the top of a wall the normal is level.
+        let facing = if 0.2 < normal.z.abs() { normal.z } else { normal.dot(outward) };
+        facing < 0.0
+    });
+    Ok((backward.map(|(root, _)| root).collect(), n_components))
+}
+
+#[derive(Default)]
+struct Component {
+    highest: usize,
+    sum: DVec3,
+    n_points: usize,
+}
