@@ -44,7 +44,7 @@ pub struct Preparation {
     /// The choice of structures. Applies if all radii are estimated, and differ from point to point.
     pub structure: StructureChoice,
     /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
-    /// structures are found, and no points of the grid are left out as outliers or by a subsample.
+    /// structures are found, and no points of the grid are left out by a subsample.
     pub free_space: bool,
     /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
     pub keep_variation: bool,

@@ -31,7 +31,7 @@ pub fn select_points(
 pub(crate) struct Selection {
     pub cloud: PointCloud,
     pub report: CleanReport,
-    /// True if a subsample or the removal of outliers left out points, whose rays thus end at nothing.
+    /// True if a subsample left out points, whose rays thus end at nothing. Outliers are few.
     pub is_thinned: bool,
 }
 
@@ -59,12 +59,12 @@ pub(crate) fn select(
     if let Some(choice) = preparation.subsample {
         cloud = subsample(&cloud, choice, preparation.seed, progress)?;
     }
+    let is_thinned = cloud.len() < n_measured;
     if let Some(choice) = preparation.remove_outliers {
         cloud = remove_outliers(&cloud, choice, progress)?;
     }
     let is_missing = |normal: &Vec3| *normal == Vec3::ZERO;
     cloud.normals = cloud.normals.filter(|normals| !normals.iter().all(is_missing));
     cloud.radii = cloud.radii.filter(|radii| !radii.iter().all(|radius| *radius == 0.0));
-    let is_thinned = cloud.len() < n_measured;
     Ok(Selection { cloud, report, is_thinned })
 }
