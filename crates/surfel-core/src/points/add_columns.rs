@@ -88,6 +88,18 @@ pub fn add_normals(
     Ok(report)
 }
 
+impl NormalReport {
+    /// Leaves out the points of straight lines, which span no plane, and get the line's direction in place of a normal.
+    pub(super) fn leave_out_lines(&mut self, fits: &[PlaneFit], shapes: &[PointShape]) {
+        let is_straight = |(fit, shape): &(&PlaneFit, &PointShape)| {
+            shape.structure == Structure::Line && fit.normal == Vec3::ZERO
+        };
+        let n_lines = fits.iter().zip(shapes).filter(is_straight).count();
+        self.n_from_nearest = self.n_from_nearest.saturating_sub(n_lines);
+        self.n_up = self.n_up.saturating_sub(n_lines);
+    }
+}
+
 /// Orients the normals of the file by a rule that was chosen, and turns them to the stations, if these are known, by one
 /// that is a default.
 pub fn orient_given_normals(

@@ -13,7 +13,7 @@ use super::scan::scan_grid::ScanGrids;
 use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
 use super::structure::find_structures::{Evidence, all_scattered, find_structures};
-use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
 use super::structure::typical::Typical;
@@ -202,9 +202,7 @@ pub fn find_shapes<'a>(
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
         for (fit, shape) in fits.iter_mut().zip(&shapes) {
-            // The points of a straight line span no plane, and have its direction in place of a normal.
-            let is_straight = shape.structure == Structure::Line && fit.normal == Vec3::ZERO;
-            if shape.is_disc() || is_straight {
+            if shape.is_disc() {
                 fit.normal = shape.normal;
             }
         }

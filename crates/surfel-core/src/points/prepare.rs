@@ -122,7 +122,10 @@ pub fn prepare(
         }
         if missing.normals {
             let orientation = orientation_by_rings(&cloud, preparation, rings.as_ref(), progress);
-            let found = add_normals(&mut cloud, &fits, orientation, progress)?;
+            let mut found = add_normals(&mut cloud, &fits, orientation, progress)?;
+            if let Some((shapes, _)) = &shapes {
+                found.leave_out_lines(&fits, shapes);
+            }
             found.repairs().iter().for_each(|line| progress.note(line));
             report.normals = Some(found);
             report.normals_from = Some(neighborhood);
