@@ -95,7 +95,7 @@ fn load(
     let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
     let preparation = &description.objects_default.preparation;
     let estimate = MemoryEstimate::from_files(&infos, preparation.subsample, 0);
-    estimate.check(description.run.memory_limit)?;
+    estimate.with_estimates().check(description.run.memory_limit)?;
     report_unused_of_files(infos.values(), preparation, progress);
     let options = preparation.load_options(ColumnChoice::All)?;
     let mut loaded = match preparation.reproject {

@@ -120,6 +120,12 @@ fn estimate_by_nearest<'a>(
 ) -> Result<Estimates<'a>> {
     let NearestSearch { k_normal, k_radius, has_voters } = *search;
     let tree = KdTree::new(positions, progress)?;
+    let n_points = positions.len();
+    let mut fits = vec![PlaneFit::default(); n_points];
+    let mut jets: Vec<Option<JetFit>> = vec![None; n_points];
+    let mut distances = vec![0.0; if k_radius.is_some() { n_points } else { 0 }];
+    let n_voters = if has_voters { n_points } else { 0 };
+    let (mut voters, mut by_gap) = (vec![Voters::default(); n_voters], vec![false; n_voters]);
     let visit = |point: usize, neighbors: &[Neighbor]| {
         let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
         // Farther ones are for radii alone.
@@ -131,15 +137,18 @@ fn estimate_by_nearest<'a>(
         (fit, jet, distance, around)
     };
     let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);
-    let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
-    let distances = found.iter().map(|(_, _, distance, _)| *distance).collect();
-    let (voters, is_by_gap) = found.iter().filter_map(|(.., around)| *around).unzip();
-    let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, ..)| *jet).collect();
-    let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
+    tree.visit_in_blocks(Neighborhood::Nearest(k), progress, visit, |visited| {
+        visited.scatter(&mut fits, |(fit, ..)| *fit);
+        visited.scatter(&mut jets, |(_, jet, ..)| *jet);
+        visited.scatter(&mut distances, |(_, _, distance, _)| *distance);
+        visited.scatter(&mut voters, |(.., around)| around.map_or_else(Voters::default, |it| it.0));
+        visited.scatter(&mut by_gap, |(.., around)| around.is_some_and(|it| it.1));
+    })?;
     refine_normals(&tree, &mut fits, &jets, normals, progress)?;
+    drop(jets);
     let radii = k_radius.map(|k| clamp_outlier_radii(&tree, k, distances, progress)).transpose()?;
     let fits = Some((fits, Neighborhood::Nearest(k_normal)));
-    Ok(Estimates { fits, radii, tree: Some(tree), voters, is_by_gap })
+    Ok(Estimates { fits, radii, tree: Some(tree), voters, is_by_gap: by_gap })
 }
 
 /// Finds the structures of points, and replaces the estimates by those of their structure. `rings` are those of a spinning

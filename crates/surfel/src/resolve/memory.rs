@@ -18,6 +18,8 @@ use surfel_formats::FileInfo;
 pub struct MemoryEstimate {
     n_points: u64,
     n_kept_points: u64,
+    /// Number of the points whose normals, radii and structure are estimated, as far as that is known.
+    n_estimated_points: u64,
     /// Number of the points that are trained splats, and shown as such.
     n_splats: u64,
     n_triangles: u64,
@@ -39,6 +41,10 @@ const TRIANGLE: u64 = 12 + 12 + 12 + 8;
 
 /// Bytes of a point's tree, block and index.
 const FLAT_POINT: u64 = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
+
+/// Bytes of a point while its normal, radius and structure are estimated, beside those as it is loaded: measured with 2.5
+/// million points of a ruin, of which the search for structures takes half.
+const ESTIMATED_POINT: u64 = 175;
 
 /// Bytes of a triangle's tree and corners.
 const FLAT_TRIANGLE: u64 = 42;
@@ -73,12 +79,18 @@ impl MemoryEstimate {
         Self {
             n_points,
             n_kept_points,
+            n_estimated_points: 0,
             n_splats,
             n_triangles,
             n_texels: 0,
             picture,
             flat_point: FLAT_POINT,
         }
+    }
+
+    /// Counts the estimate of normals, radii and structures of all points.
+    pub fn with_estimates(self) -> Self {
+        Self { n_estimated_points: self.n_kept_points, ..self }
     }
 
     /// Estimates from what was read, where textures are known too, beside the bytes of a picture.
@@ -95,20 +107,53 @@ impl MemoryEstimate {
             Geometry::Points(cloud) if cloud.has_gaussians() => Some((cloud.len() as u64, 1)),
             _ => None,
         });
-        let (n_splats, flat_point) = (sum(clouds), FLAT_POINT);
-        Self { n_points, n_kept_points, n_splats, n_triangles, n_texels, picture, flat_point }
+        let n_splats = sum(clouds);
+        let incomplete = graph.geometries.iter().filter_map(|geometry| match geometry {
+            Geometry::Points(cloud) if cloud.normals.is_none() || cloud.radii.is_none() => {
+                Some((cloud.len() as u64, 1))
+            }
+            _ => None,
+        });
+        let n_estimated_points = sum(incomplete).saturating_sub(n_splats).min(n_kept_points);
+        let flat_point = FLAT_POINT;
+        Self {
+            n_points,
+            n_kept_points,
+            n_estimated_points,
+            n_splats,
+            n_triangles,
+            n_texels,
+            picture,
+            flat_point,
+        }
     }
 
     /// Adds the structures that the surfaces of a description take besides the points' tree.
     pub fn with_surfaces_of(self, description: &SceneDescription) -> Self {
         let scene = &description.objects_default;
         let objects = description.objects.iter().map(|object| object.settings.over(scene));
-        let kinds = objects.chain([scene.clone()]).map(|settings| settings.surface.surface());
-        let most = kinds.map(max_field_bytes).max().unwrap_or_default() as u64;
+        let kinds: Vec<SurfaceKind> =
+            objects.chain([scene.clone()]).map(|settings| settings.surface.surface()).collect();
+        let most = kinds.iter().copied().map(max_field_bytes).max().unwrap_or_default() as u64;
+        // Pixels need neither normals nor radii.
+        let are_pixels = kinds.iter().all(|kind| *kind == SurfaceKind::Points);
+        let n_estimated_points = if are_pixels { 0 } else { self.n_estimated_points };
         let surface = scene.surface.surface;
         let are_gaussians = surface.is_none_or(|kind| kind == SurfaceKind::Gaussian);
         let n_splats = if are_gaussians { self.n_splats } else { 0 };
-        Self { flat_point: self.flat_point + most, n_splats, ..self }
+        let flat_point = self.flat_point + most;
+        Self { flat_point, n_splats, n_estimated_points, ..self }
+    }
+
+    /// Bytes of the input as read, of its preparation or of the flat form with what building it takes, whichever is more,
+    /// and of the picture.
+    fn peak(&self) -> [u64; 3] {
+        let [read, flat, picture] = self.bytes();
+        [read, flat.max(self.preparation()), picture]
+    }
+
+    fn preparation(&self) -> u64 {
+        sum([(self.n_estimated_points, ESTIMATED_POINT)])
     }
 
     /// Bytes of the input as read, of the flat form with what building it takes, and of the picture.
@@ -139,7 +184,7 @@ impl MemoryEstimate {
     /// Fails with [`Error::OutOfMemory`], which says what would fit.
     pub fn check(&self, limit: Option<u64>) -> Result<()> {
         let Some(limit) = limit else { return Ok(()) };
-        let ([read, flat, picture], all) = (self.bytes(), self.total());
+        let ([read, prepared, picture], all) = (self.peak(), self.total());
         if all <= limit {
             return Ok(());
         }
@@ -147,12 +192,13 @@ impl MemoryEstimate {
         let there = things.iter().filter(|(count, _)| 0 < *count);
         let things: Vec<String> = there.map(|(count, name)| counted(*count, name)).collect();
         Err(Error::OutOfMemory(format!(
-            "{} need about {} of memory ({} as read, {} tree, {} picture), and \
+            "{} need about {} of memory ({} as read, {} {}, {} picture), and \
              --memory-limit is {}; {}raise the limit",
             things.join(" and "),
             readable(all),
             readable(read),
-            readable(flat),
+            readable(prepared),
+            if prepared == self.preparation() { "preparation" } else { "tree" },
             readable(picture),
             readable(limit),
             self.advice(limit),
@@ -160,14 +206,16 @@ impl MemoryEstimate {
     }
 
     fn total(&self) -> u64 {
-        sum(self.bytes().map(|bytes| (bytes, 1)))
+        sum(self.peak().map(|bytes| (bytes, 1)))
     }
 
     /// Advice that helps besides a higher limit, if there is any.
     fn advice(&self, limit: u64) -> String {
-        let least = Self { n_kept_points: 0, ..*self }.total();
+        let least = Self { n_kept_points: 0, n_estimated_points: 0, ..*self }.total();
         let splat = if 0 < self.n_splats { MAX_GAUSSIAN_BYTES as u64 } else { 0 };
-        let fitting = limit.saturating_sub(least) / 5 * 2 / (self.flat_point + splat);
+        let estimate = if 0 < self.n_estimated_points { ESTIMATED_POINT } else { 0 };
+        let each = (5 * (self.flat_point + splat)).max(2 * estimate);
+        let fitting = limit.saturating_sub(least) / each * 2;
         let [.., picture] = self.bytes();
         if 0 < fitting && fitting < self.n_kept_points {
             return format!("keep fewer points with --subsample random:{fitting} or ");
@@ -210,10 +258,13 @@ mod tests {
     //! The advice fits the limit.
 
     use super::*;
+    use surfel_core::math::Vec3;
+    use surfel_core::scene::Material;
 
     const NOTHING: MemoryEstimate = MemoryEstimate {
         n_points: 0,
         n_kept_points: 0,
+        n_estimated_points: 0,
         n_splats: 0,
         n_triangles: 0,
         n_texels: 0,
@@ -239,6 +290,27 @@ mod tests {
         assert_eq!(advice(n_points, n_points, 760_000, 30_000_000), "");
         assert_eq!(advice(n_points, 16, 760_000, 30_000_000), "");
         assert!(advice(64, 64, 19_000, 10_000).contains("--resolution"));
+    }
+
+    #[test]
+    fn estimates_of_columns_count_where_they_are_made() {
+        let estimate = |surface: SurfaceKind, has_columns: bool| {
+            let mut cloud = PointCloud::from_positions(vec![Vec3::X; 1000]);
+            cloud.normals = has_columns.then(|| vec![Vec3::Z; 1000]);
+            cloud.radii = has_columns.then(|| vec![1.0; 1000]);
+            let graph = Graph::from_geometry(Geometry::Points(cloud), Material::MATTE);
+            let mut description = SceneDescription::default();
+            description.objects_default.surface.surface = Some(surface);
+            MemoryEstimate::from_graph(&graph, None, 0).with_surfaces_of(&description)
+        };
+        let missing = estimate(SurfaceKind::Smooth, false);
+        assert_eq!(missing.total(), 1000 * (COLUMNS + ESTIMATED_POINT));
+        let text = missing.check(Some(100_000)).unwrap_err().to_string();
+        assert!(text.contains("preparation, 0 B picture"), "{text}");
+        for (surface, has_columns) in [(SurfaceKind::Smooth, true), (SurfaceKind::Points, false)] {
+            let known = estimate(surface, has_columns);
+            assert_eq!(known.total(), 1000 * COLUMNS + 1000 * FLAT_POINT / 2 * 5);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest, NearestSet
 use super::kd_tree::{KdTree, LANES, Subtree, Target};
 use super::nearby_leaves::NearbyLeaves;
 use super::neighbor::{Neighbor, Neighborhood, checked_square};
-use super::neighbor_index::{NeighborIndex, map};
+use super::neighbor_index::{NeighborIndex, Visited, visit_in_blocks};
 use crate::error::{Error, Result};
 use crate::math::{Aabb, Vec3};
 use crate::progress::Progress;
@@ -188,6 +188,24 @@ impl KdTree<'_> {
         progress: &dyn Progress,
         visit: impl Fn(usize, &[Neighbor]) -> T + Sync,
     ) -> Result<Vec<T>> {
+        let mut values = vec![T::default(); self.positions().len()];
+        let store = |visited: Visited<T>| visited.scatter(&mut values, |value| *value);
+        self.visit_in_blocks(neighborhood, progress, visit, store)?;
+        Ok(values)
+    }
+
+    /// Passes `visit(point, neighbours)` of every point to `store`, many points at a time. Neighbours come nearest first.
+    ///
+    /// # Errors
+    ///
+    /// Fails as [`Self::map`] does.
+    pub(crate) fn visit_in_blocks<T: Send + Sync>(
+        &self,
+        neighborhood: Neighborhood,
+        progress: &dyn Progress,
+        visit: impl Fn(usize, &[Neighbor]) -> T + Sync,
+        store: impl FnMut(Visited<T>),
+    ) -> Result<()> {
         match neighborhood {
             Neighborhood::Nearest(0) => Err(Error::Setting {
                 name: "number of neighbours",
@@ -195,15 +213,16 @@ impl KdTree<'_> {
                 expected: "at least 1",
             }),
             Neighborhood::Nearest(k) => {
-                map(&AllKnn { tree: self, k }, self.positions(), progress, visit)
+                visit_in_blocks(&AllKnn { tree: self, k }, self.positions(), progress, visit, store)
             }
             Neighborhood::Within(distance) => {
                 let distance_squared = checked_square(distance)?;
-                map(
+                visit_in_blocks(
                     &AllWithinDistance { tree: self, distance_squared },
                     self.positions(),
                     progress,
                     visit,
+                    store,
                 )
             }
         }

@@ -24,6 +24,28 @@ pub(super) trait NeighborIndex: Sync {
     ) -> Result<()>;
 }
 
+/// Results of some points, in lists of which each is in the order of the points.
+pub(crate) struct Visited<T>(Vec<Vec<(u32, T)>>);
+
+impl<T: Sync> Visited<T> {
+    /// Writes a part of each result to the place of its point in a column of all points, of which each thread owns a part.
+    pub fn scatter<U: Send>(&self, column: &mut [U], part: impl Fn(&T) -> U + Sync) {
+        let part_size = column.len().div_ceil(rayon::current_num_threads()).max(1);
+        column.par_chunks_mut(part_size).enumerate().for_each(|(chunk, column)| {
+            let (first, end) = (chunk * part_size, chunk * part_size + column.len());
+            for visited in &self.0 {
+                let start = visited.partition_point(|(point, _)| (*point as usize) < first);
+                for (point, result) in &visited[start..] {
+                    if end <= *point as usize {
+                        break;
+                    }
+                    column[*point as usize - first] = part(result);
+                }
+            }
+        });
+    }
+}
+
 /// Returns `visit(point, neighbours)` of every point, in the order of the points.
 pub(super) fn map<T: Copy + Default + Send + Sync>(
     index: &impl NeighborIndex,
@@ -32,9 +54,22 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
     visit: impl Fn(usize, &[Neighbor]) -> T + Sync,
 ) -> Result<Vec<T>> {
     let mut values = vec![T::default(); positions.len()];
+    let store = |visited: Visited<T>| visited.scatter(&mut values, |value| *value);
+    visit_in_blocks(index, positions, progress, visit, store)?;
+    Ok(values)
+}
+
+/// Passes `visit(point, neighbours)` of every point to `store`, those of one block of slots after the other.
+pub(super) fn visit_in_blocks<T: Send + Sync>(
+    index: &impl NeighborIndex,
+    positions: &[Vec3],
+    progress: &dyn Progress,
+    visit: impl Fn(usize, &[Neighbor]) -> T + Sync,
+    mut store: impl FnMut(Visited<T>),
+) -> Result<()> {
     let n_slots = index.n_slots();
     progress.begin("neighbours", n_slots as u64);
-    // Blocks bound the memory of values that are not yet in the order of the points, and keep all threads busy.
+    // Blocks bound the memory of results that are not yet in the order of the points, and keep all threads busy.
     let block_size = block_size(index.chunk_size(), rayon::current_num_threads());
     for block in ranges(0..n_slots, block_size) {
         let chunks: Vec<Range<usize>> = ranges(block, index.chunk_size()).collect();
@@ -49,34 +84,17 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
             progress.advance(n_slots as u64);
             Ok(visited)
         });
-        scatter(&visited.collect::<Result<Vec<_>>>()?, &mut values);
+        store(Visited(visited.collect::<Result<Vec<_>>>()?));
     }
-    for (point, _) in positions.iter().enumerate().filter(|(_, p)| !p.is_finite()) {
-        values[point] = visit(point, &[]);
-    }
-    Ok(values)
+    let not_finite = positions.iter().enumerate().filter(|(_, p)| !p.is_finite());
+    let visited = not_finite.map(|(point, _)| (point as u32, visit(point, &[])));
+    store(Visited(vec![visited.collect()]));
+    Ok(())
 }
 
 /// Returns the number of slots whose values are put in order together: enough chunks for all threads.
 fn block_size(chunk_size: usize, n_threads: usize) -> usize {
     (2 * n_threads * chunk_size).max(1 << 18)
-}
-
-/// Writes visited values, of which each list is in the order of the points, to `values`, of which each thread owns a part.
-fn scatter<T: Copy + Send + Sync>(visited: &[Vec<(u32, T)>], values: &mut [T]) {
-    let part_size = values.len().div_ceil(rayon::current_num_threads()).max(1);
-    values.par_chunks_mut(part_size).enumerate().for_each(|(part, values)| {
-        let (first, end) = (part * part_size, part * part_size + values.len());
-        for visited in visited {
-            let start = visited.partition_point(|(point, _)| (*point as usize) < first);
-            for &(point, value) in &visited[start..] {
-                if end <= point as usize {
-                    break;
-                }
-                values[point as usize - first] = value;
-            }
-        }
-    });
 }
 
 /// Splits a range into ranges of `size`, the last of which may be shorter.
