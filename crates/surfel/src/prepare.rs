@@ -33,6 +33,12 @@ struct Columns {
     variation: bool,
 }
 
+impl Columns {
+    fn any(&self) -> bool {
+        self.normals || self.radii || self.variation
+    }
+}
+
 /// Reads files as one cloud and prepares it by the settings of a description for everything.
 ///
 /// # Errors
@@ -45,7 +51,7 @@ pub fn prepare_files(
     options: PrepareOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let Loaded { cloud, info } = load(files, description, progress)?;
+    let Loaded { cloud, info } = load(files, description, options, progress)?;
     let cloud = prepared(cloud, description, options, progress).map_err(|cause| {
         let settings = &description.objects_default.preparation;
         let is_empty = cause == surfel_core::Error::EmptyCloud;
@@ -89,13 +95,21 @@ pub fn prepare_points(
 fn load(
     files: &[PathBuf],
     description: &SceneDescription,
+    options: PrepareOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let inspected = files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
     let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
     let preparation = &description.objects_default.preparation;
-    let estimate = MemoryEstimate::from_files(&infos, preparation.subsample, 0);
-    estimate.with_estimates().check(description.run.memory_limit)?;
+    let has_estimates = columns(options, &description.objects_default).any();
+    let check_points = |points: MemoryEstimate| {
+        let all = if has_estimates { points.with_estimates() } else { points };
+        all.check(description.run.memory_limit)
+    };
+    // How many points a filter keeps, and a text has, is known when they are read.
+    if !preparation.filters_points() {
+        check_points(MemoryEstimate::from_files(&infos, preparation.subsample, 0))?;
+    }
     report_unused_of_files(infos.values(), preparation, progress);
     let options = preparation.load_options(ColumnChoice::All)?;
     let mut loaded = match preparation.reproject {
@@ -103,6 +117,7 @@ fn load(
         _ => surfel_formats::load_all(files, &options, progress)?.0,
     };
     progress.end();
+    check_points(MemoryEstimate::of_points(loaded.cloud.len() as u64, preparation.subsample))?;
     let points = counted(loaded.cloud.len(), "point");
     progress.note(&format!("{points}, {}", loaded.info.format));
     report_degrees(&loaded, preparation, progress);
@@ -153,7 +168,7 @@ fn prepared(
         mixed_pixels: settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep),
         ..settings.preparation(seed)
     };
-    if !columns.normals && !columns.radii && !columns.variation {
+    if !columns.any() {
         return without_estimates(cloud, &preparation, progress);
     }
     preparation.keep_variation = columns.variation;
@@ -210,14 +225,13 @@ fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
         radii: preparation.radius.is_some(),
         variation: options.keep_variation,
     };
-    let is_empty = !columns.normals && !columns.radii && !columns.variation;
     let has_other_steps = preparation.subsample.is_some()
         || preparation.filters_points()
         || preparation.duplicates.is_some()
         || preparation.mixed_pixels.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
-    if is_empty && !has_other_steps {
+    if !columns.any() && !has_other_steps {
         return Columns { normals: true, radii: true, variation: false };
     }
     columns

@@ -177,6 +177,24 @@ fn the_memory_limit_is_checked_before_the_work() {
     succeed(&["info", &cloud, "--memory-limit", "1M"]);
 }
 
+#[test]
+fn the_memory_limit_counts_the_points_that_a_filter_keeps() {
+    let folder = Folder::new();
+    let cloud = folder.write("square.xyz", square(100, 9));
+    let (picture, prepared) = (folder.path("out.png"), folder.path("out.ply"));
+    // Normals, radii and structures of 10,000 points take 1.7 MiB beside the points.
+    let render =
+        ["render", &cloud, "-o", &picture, "--resolution", "64x48", "--memory-limit", "1500K"];
+    let prepare = ["prepare", &cloud, "-o", &prepared, "--normals", "--memory-limit", "1500K"];
+    for arguments in [&render[..], &prepare[..]] {
+        let text = fail(arguments, 1);
+        assert!(text.contains("preparation") && text.contains("1.5 MiB"), "{text}");
+        succeed(&[arguments, &["--crop", "([0,20],[0,20])"]].concat());
+        let text = fail(&[arguments, &["--crop", "([0,90],[0,90])"]].concat(), 1);
+        assert!(text.contains("8281 points need"), "{text}");
+    }
+}
+
 /// Scanners and programs write their largest numbers where nothing was measured.
 #[test]
 fn points_without_a_measurement_do_not_change_the_picture() {

@@ -37,10 +37,12 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
             keep_largest_frame(&mut infos, object);
         }
     }
-    let subsample = description.objects_default.preparation.subsample;
-    MemoryEstimate::from_files(&infos, subsample, picture_bytes(description))
-        .with_surfaces_of(description)
-        .check(description.run.memory_limit)
+    let settings = &description.objects_default.preparation;
+    let estimate =
+        MemoryEstimate::from_files(&infos, settings.subsample, picture_bytes(description))
+            .with_surfaces_of(description);
+    let known = if settings.filters_points() { estimate.without_points() } else { estimate };
+    known.check(description.run.memory_limit)
 }
 
 /// Leaves the largest file of a streamed sequence.

@@ -75,17 +75,26 @@ impl MemoryEstimate {
             sum(clouds.iter().filter(|(_, are_splats)| *are_splats).map(|(n, _)| (*n, 1)));
         let triangles = files.values().filter_map(|info| info.n_triangles);
         let n_triangles = sum(triangles.map(|n| (n, 1)));
-        let n_kept_points = kept(n_points, subsample);
+        Self { n_splats, n_triangles, picture, ..Self::of_points(n_points, subsample) }
+    }
+
+    /// Estimates from a number of points that were read.
+    pub fn of_points(n_points: u64, subsample: Option<Subsample>) -> Self {
         Self {
             n_points,
-            n_kept_points,
+            n_kept_points: kept(n_points, subsample),
             n_estimated_points: 0,
-            n_splats,
-            n_triangles,
+            n_splats: 0,
+            n_triangles: 0,
             n_texels: 0,
-            picture,
+            picture: 0,
             flat_point: FLAT_POINT,
         }
+    }
+
+    /// Leaves the points out: how many a filter keeps is known only when they are read.
+    pub fn without_points(self) -> Self {
+        Self { n_points: 0, n_kept_points: 0, n_estimated_points: 0, n_splats: 0, ..self }
     }
 
     /// Counts the estimate of normals, radii and structures of all points.
@@ -100,31 +109,24 @@ impl MemoryEstimate {
         picture: u64,
     ) -> Self {
         let (n_points, n_triangles) = graph.n_points_and_triangles();
-        let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
-        let n_texels = graph.textures.iter().map(|texture| texture.texels.len() as u64).sum();
-        let n_kept_points = kept(n_points, subsample);
-        let clouds = graph.geometries.iter().filter_map(|geometry| match geometry {
-            Geometry::Points(cloud) if cloud.has_gaussians() => Some((cloud.len() as u64, 1)),
-            _ => None,
+        let points = Self::of_points(n_points as u64, subsample);
+        let n_points_of = |is_chosen: fn(&PointCloud) -> bool| {
+            let clouds = graph.geometries.iter().filter_map(|geometry| match geometry {
+                Geometry::Points(cloud) if is_chosen(cloud) => Some((cloud.len() as u64, 1)),
+                _ => None,
+            });
+            sum(clouds)
+        };
+        let n_incomplete = n_points_of(|cloud| {
+            !cloud.has_gaussians() && (cloud.normals.is_none() || cloud.radii.is_none())
         });
-        let n_splats = sum(clouds);
-        let incomplete = graph.geometries.iter().filter_map(|geometry| match geometry {
-            Geometry::Points(cloud) if cloud.normals.is_none() || cloud.radii.is_none() => {
-                Some((cloud.len() as u64, 1))
-            }
-            _ => None,
-        });
-        let n_estimated_points = sum(incomplete).saturating_sub(n_splats).min(n_kept_points);
-        let flat_point = FLAT_POINT;
         Self {
-            n_points,
-            n_kept_points,
-            n_estimated_points,
-            n_splats,
-            n_triangles,
-            n_texels,
+            n_estimated_points: n_incomplete.min(points.n_kept_points),
+            n_splats: n_points_of(PointCloud::has_gaussians),
+            n_triangles: n_triangles as u64,
+            n_texels: graph.textures.iter().map(|texture| texture.texels.len() as u64).sum(),
             picture,
-            flat_point,
+            ..points
         }
     }
 
