@@ -329,12 +329,17 @@ fn the_help_of_colors_lists_every_source() {
     assert!(keys.iter().any(|(path, ..)| path == "color"));
 }
 
+/// Returns the motion of the camera by the first animation of a text.
+fn camera_motion(text: &str) -> CameraMotion {
+    let mut motion = CameraMotion::default();
+    parse(text).unwrap().animations[0].camera_motion(&mut motion).unwrap();
+    motion
+}
+
 #[test]
 fn keys_of_the_camera_change_its_projection() {
     let text = "[[animation]]\nobject = \"camera\"\ntimes = [0, 2]\nview-angle = [30, 60]\northographic = [4, 8]\nview-up = [[0, 0, 1], [0, 1, 1]]";
-    let scene = parse(text).unwrap();
-    let mut motion = CameraMotion::default();
-    scene.animations[0].camera_motion(&mut motion).unwrap();
+    let motion = camera_motion(text);
     assert_eq!(motion.duration_secs(), 2.0);
     let at = |projection| {
         let (position, focal_point) = (DVec3::ZERO, DVec3::Y);
@@ -385,9 +390,7 @@ fn rotations_by_half_a_turn_and_more_turn_as_their_angles_say() {
 #[test]
 fn the_camera_stays_where_its_orbit_ends() {
     let text = "[[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 4\nturns = 0.25";
-    let scene = parse(text).unwrap();
-    let mut motion = CameraMotion::default();
-    scene.animations[0].camera_motion(&mut motion).unwrap();
+    let motion = camera_motion(text);
     let projection = Projection::Perspective { view_angle_deg: 20.0 };
     let position_at = |time_secs: f64| {
         let (position, focal_point) = (DVec3::X, DVec3::ZERO);
