@@ -23,7 +23,8 @@ use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Point clouds, meshes and glTF scenes.
+    /// Point clouds, meshes and glTF scenes. A folder stands for its files, `*` for any part of a name, - for standard
+    /// input.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// JSON instead of a table: one object a file, in an array if there are several.

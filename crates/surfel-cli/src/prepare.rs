@@ -55,7 +55,7 @@ Examples:
   surfel prepare scan.laz -o ground.laz --class ground                points of a class
   surfel prepare scan.laz -o kept.laz --remove-outliers statistical   without points that stand alone
   surfel prepare scan.laz -o once.laz --duplicates drop               one point at each position
-  surfel prepare scan.laz -o scan.xyz --duplicates keep               as text, with no other change
+  surfel prepare scan.laz -o scan.xyz --duplicates keep               as text, without noise and withheld points
   surfel prepare scan.laz -o calm.laz --denoise on                    points moved onto their surface
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";

@@ -30,11 +30,11 @@ pub struct Limits {
     pub max_side_length: u32,
     /// Maximum size of a page's message or a request's body, in bytes.
     pub max_message_bytes: usize,
-    /// Maximum number of saved pictures and files of points that are made at once, for all clients.
+    /// Maximum number of saved pictures, films and files of points that are made at once, for all clients.
     pub max_renders: usize,
     /// Maximum number of blocking tasks at once, for all clients; further tasks wait.
     pub max_tasks: usize,
-    /// Maximum number of one page's saved pictures and files of points that are made or on their way.
+    /// Maximum number of one page's saved pictures, films, files of points and added files that are made or on their way.
     pub max_page_saves: usize,
     /// Maximum number of one page's questions about points at once: picks, profiles, volumes and histograms.
     pub max_page_queries: usize,

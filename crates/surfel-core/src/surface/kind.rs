@@ -25,8 +25,8 @@ pub enum SurfaceKind {
     Disc,
     /// All discs within one radius behind the nearest are blended, with normals as stored.
     SplatMean,
-    /// All discs within one radius behind the nearest are blended, with normals first turned toward the ray's
-    /// origin.
+    /// All discs within one radius behind the nearest are blended, with normals first turned to one side, by the rule
+    /// `Align`.
     Splat,
     /// All discs within two radii behind the nearest are blended; the normal is that of a plane fitted to
     /// their centres.

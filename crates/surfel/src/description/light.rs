@@ -32,7 +32,7 @@ settings! {
     /// Lights of the whole scene; lamps at places stand in `SceneDescription::lamps`.
     pub struct LightSettings {
         /// Lights: sun, sky, headlight, several separated by commas, or none, which shows the colours as they are
-        /// [default: sun,sky, or none but the environment map where there is one].
+        /// [default: sun,sky; the environment map alone if there is one; a headlight where no sun reaches].
         light: Vec<LightKind>, SeveralOf(OneOf(LIGHT_KINDS)), "KINDS", common;
         /// Environment map that lights the scene: .hdr or .exr, equirectangular.
         environment: PathBuf, FilePath, "FILE";
@@ -51,7 +51,8 @@ settings! {
         /// Puts the sun where it stands at a date and time, as in 2026-06-21T15:00+02:00. The place follows from the
         /// coordinate system of the file or of --crs, or is given by --place.
         date: DateTime<FixedOffset>, DateRule, "DATE";
-        /// Direction of the sun in degrees clockwise from north [default: behind the camera, to the left].
+        /// Direction of the sun in degrees clockwise from north [default: behind the camera, to the left, or to
+        /// the right if more is lit then].
         azimuth: f64, number(-360.0, 360.0), "DEG";
         /// Height of the sun above the horizon in degrees.
         elevation: f64 = 40.0, number(-90.0, 90.0), "DEG";
@@ -67,7 +68,7 @@ settings! {
     pub struct SkySettings {
         /// Multiplies the light of the sky.
         strength: f64 = 1.0, GAIN, "FACTOR";
-        /// Distance in world units up to which things darken the sky [default: a fraction of the scene's size].
+        /// Distance in world units up to which things darken the sky [default: 0.15 of the scene's diagonal].
         ao_distance: f64, POSITIVE, "LENGTH";
     }
 }

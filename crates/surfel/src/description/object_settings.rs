@@ -36,14 +36,14 @@ settings! {
         surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND", common;
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
-        /// Side of normals that splat blends: each is turned toward the viewer, or to the side of the nearest, or both
-        /// [default: both].
+        /// Rule by which splat turns normals before it blends them: each (toward the viewer), nearest (to the side of the
+        /// nearest disc) or both [default: both].
         align: Align, OneOf(&Align::ALL), "RULE";
-        /// Discs that are blended: up to the least distance plus radius of all (least), or up to that of the nearest
-        /// disc [default: least].
+        /// Discs that are blended: up to the least distance plus radius of all discs on the ray (least), or up to that of
+        /// the nearest disc (nearest) [default: least].
         gather_limit: GatherLimit, OneOf(&GatherLimit::ALL), "RULE";
         /// Distance before which shadows, reflections and refractions ignore the surface, in radii. At 0 neighbouring discs
-        /// shade each other [default: 2 for discs, 0.5 for smooth and mls].
+        /// shade each other [default: 2 for discs, 0.5 for smooth, implicit and mls].
         min_distance: f64, number(0.0, 100.0), "RADII";
         /// How far points count, in radii: from a ray for cylinder, from a position for mls, from a hit for splat-fit
         /// [default: 1, 1.4 and 2].
@@ -80,7 +80,8 @@ settings! {
         /// "intensity[100:]"; surfel info lists the columns. Colours go from 0 to 255, or to
         /// 65535 where they are compared with a number above 255.
         filter: PointFilter, parsed(PointFilter::to_string), "CONDITION", common;
-        /// Keeps only points of these ASPRS classes, as in 2,6 or ground,building.
+        /// Keeps only points of these ASPRS classes, as in 2,6 or ground,building. Without it, all but the classes of noise,
+        /// 7 and 18, are kept.
         class: Vec<u8>, Classes, "CLASSES";
         /// Keeps only these returns of each laser pulse: first, last or only (those of pulses that have one).
         returns: Returns, OneOf(RETURNS), "WHICH";
@@ -121,7 +122,8 @@ settings! {
         /// [default: that of the file, or adaptive:12].
         radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
-        /// (leaves) apart; surface treats all points as surface, scatter all as scattered.
+        /// (leaves) apart; surface treats all points as surface, scatter all as scattered. Radii of the file, a length and
+        /// the median leave all points surface.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
         /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell unless points are left
         /// out: by default also of filtered files.

@@ -18,8 +18,8 @@ settings! {
         resolution: (u32, u32) = default_resolution(), Resolution, "WxH", common;
         /// Camera rays per pixel.
         spp: u32 = Settings::default().samples_per_pixel, count(1, MAX_SAMPLES as u64), "N", common;
-        /// Error at which pixels take no more than some of the --spp camera rays, on the CPU: 0.01 is about one of 255
-        /// steps of brightness. 0 traces all rays everywhere.
+        /// Noise at which a block of pixels takes no further camera rays, on the CPU: 0.01 is about one of 255 steps of
+        /// brightness. 0 traces all --spp rays everywhere.
         noise_threshold: f64 = 0.0, number(0.0, 1.0), "ERROR";
         /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
         light_samples: u32 = Settings::default().light_samples, count(1, MAX_SAMPLES as u64), "N";
@@ -34,9 +34,10 @@ settings! {
         seed: u64 = Settings::default().seed, count(0, u64::MAX), "N";
         /// Draws a legend: the classes that are there with their colours, or the colour map with its values.
         legend: bool = false, Flag, "";
-        /// Draws a bar of a round length; for --camera-orthographic.
+        /// Draws a bar of a round length; for pictures without perspective, as by --camera-orthographic or --gsd.
         scale_bar: bool = false, Flag, "";
-        /// Draws an arrow to the north, which is +Y; for --camera-orthographic.
+        /// Draws an arrow to the north, which is +Y if +Z is up; for pictures without perspective, as by
+        /// --camera-orthographic or --gsd.
         north: bool = false, Flag, "";
         /// Writes a line of text at the lower left.
         caption: String, Text, "TEXT";
@@ -117,7 +118,7 @@ settings! {
         threads: u32, count(1, 1024), "N";
         /// Refuse work that needs more memory than this, as in 8G.
         memory_limit: u64, MemorySize, "SIZE";
-        /// Device that does the work: auto, cpu or gpu.
+        /// Device that does the work: auto (a GPU for large pictures, if it can render them), cpu or gpu.
         backend: Backend = Backend::Auto,
             OneOf(&[("auto", Backend::Auto), ("cpu", Backend::Cpu), ("gpu", Backend::Gpu)]), "NAME";
         /// GPU that does the work, by its index or a part of its name as `surfel devices` lists them [default: the
