@@ -4,5 +4,6 @@
 
 pub mod planes;
 pub mod jets;
+pub mod outward_votes;
 pub mod spanning_tree;
 pub mod orient;

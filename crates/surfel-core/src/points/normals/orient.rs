@@ -31,8 +31,9 @@ pub enum Orientation {
     /// Toward +Z, as for airborne scans.
     Up,
     /// Propagated along a minimum spanning tree from neighbour to neighbour, the most parallel first (Hoppe et al.
-    /// 1992). The normal of the highest point of each connected component points up or, if it is nearly level,
-    /// outward.
+    /// 1992), but not between parts for which rays tell otherwise: they get farther outside than inside. Where rays
+    /// tell nothing, as for a wall alone, the normal of the highest point of each connected component points up or, if
+    /// it is nearly level, outward.
     SpanningTree,
 }
 
@@ -234,6 +235,39 @@ mod tests {
             let found = orient(&cloud, normals, Orientation::SpanningTree, &NoProgress).unwrap();
             assert!(found.iter().all(|normal| 0.0 < normal.z), "curvature {curvature}");
         }
+    }
+
+    #[test]
+    fn boxes_on_the_ground_are_oriented_outward_beyond_their_sharp_edges() {
+        let mut random = Random::new(2, 0);
+        let mut next = || random.next_f32();
+        let (mut positions, mut outward) = (Vec::new(), Vec::new());
+        let corners: Vec<Vec3> =
+            (0..9).map(|i| 5.0 * Vec3::new((i % 3) as f32, (i / 3) as f32, 0.0)).collect();
+        while positions.len() < 60_000 {
+            let ground = Vec3::new(20.0 * next() - 4.0, 20.0 * next() - 4.0, 0.0);
+            let is_under = |corner: &Vec3| {
+                let offset = ground - *corner;
+                0.0 < offset.min_element() + 1e-6 && offset.max_element() < 1.5
+            };
+            if !corners.iter().any(is_under) {
+                positions.push(ground);
+                outward.push(Vec3::Z);
+            }
+            // The bottom of a box is not seen.
+            let corner = corners[(9.0 * next()) as usize];
+            let axis = (3.0 * next()) as usize;
+            let is_high = axis == 2 || next() < 0.5;
+            let mut on_box = Vec3::new(next(), next(), next());
+            on_box[axis] = if is_high { 1.0 } else { 0.0 };
+            positions.push(corner + 1.5 * on_box);
+            outward.push(if is_high { Vec3::AXES[axis] } else { -Vec3::AXES[axis] });
+        }
+        let mixed = outward.iter().map(|&n| if next() < 0.4 { -n } else { n }).collect();
+        let cloud = PointCloud::from_positions(positions);
+        let found = orient(&cloud, mixed, Orientation::SpanningTree, &NoProgress).unwrap();
+        let n_wrong = found.iter().zip(&outward).filter(|(a, b)| a.dot(**b) < 0.0).count();
+        assert!(n_wrong < 60, "{n_wrong}");
     }
 
     #[test]

@@ -1,5 +1,7 @@
-//! Signs of normals along a minimum spanning tree of the neighbour graph (Hoppe et al. 1992).
+//! Signs of normals along a minimum spanning tree of the neighbour graph (Hoppe et al. 1992), cut where it contradicts the
+//! outer sides that rays tell.
 
+use super::outward_votes::{Voter, outward_votes};
 use crate::error::Result;
 use crate::math::{DVec3, Vec3};
 use crate::points::neighbors::{KdTree, Neighborhood};
@@ -10,6 +12,11 @@ use std::collections::{HashMap, HashSet};
 
 /// Number of neighbours that each point is linked to. Each link takes about 10 bytes per point for a while.
 const DEGREE: usize = 8;
+
+/// Minimum sum of absolute votes that decide about a component.
+const MIN_VOTES: f32 = 2.0;
+/// Minimum ratio of the sum of these votes to that of their absolute values.
+const MIN_AGREEMENT: f32 = 0.5;
 
 /// Marks an unused link.
 const NONE: u32 = u32::MAX;
@@ -25,18 +32,23 @@ pub fn flips_by_spanning_tree(
     normals: &[Vec3],
     progress: &dyn Progress,
 ) -> Result<Vec<bool>> {
-    let links = KdTree::new(positions, progress)?.map(
-        Neighborhood::Nearest(DEGREE),
-        progress,
-        |_, neighbors| {
-            let mut links = [NONE; DEGREE];
-            links.iter_mut().zip(neighbors).for_each(|(link, neighbor)| *link = neighbor.index);
-            links
-        },
-    )?;
+    let tree = KdTree::new(positions, progress)?;
+    let links = tree.map(Neighborhood::Nearest(DEGREE), progress, |_, neighbors| {
+        let mut links = [NONE; DEGREE];
+        links.iter_mut().zip(neighbors).for_each(|(link, neighbor)| *link = neighbor.index);
+        links
+    })?;
+    let spacing = |(point, links): (usize, &[u32; DEGREE])| {
+        let is_used = |link: &&u32| **link != NONE;
+        let farthest = links.iter().rfind(is_used).map(|link| positions[*link as usize]);
+        farthest.map_or(0.0, |farthest| farthest.distance(positions[point]))
+    };
+    let spacings: Vec<f32> = links.par_iter().enumerate().map(spacing).collect();
+    let voters = outward_votes(&tree, &spacings, normals, progress)?;
+    drop((tree, spacings));
     let edges = sorted_edges(&links, normals, progress)?;
     progress.begin("orient", edges.len() as u64);
-    let mut components = SignedUnionFind::new(normals.len());
+    let mut components = SignedUnionFind::new(normals.len(), &voters);
     for (edge_idx, &edge) in edges.iter().enumerate() {
         if edge_idx % (1 << 16) == 0 {
             progress.check()?;
@@ -47,7 +59,9 @@ pub fn flips_by_spanning_tree(
     }
     drop((edges, links));
     let members = components.members(progress)?;
-    let (backward, n_components) = backward_components(positions, normals, &members, progress)?;
+    let votes = components.votes;
+    let (backward, n_components) =
+        backward_components(positions, normals, &members, &votes, progress)?;
     let components = counted(n_components, "connected component");
     progress.note(&format!("normals oriented along a spanning tree in {components}"));
     let is_backward = |member: &Member| member.is_flipped != backward.contains(&member.root);
@@ -100,11 +114,33 @@ struct SignedUnionFind {
     /// Parents as `parent << 1 | is_flipped`.
     parents: Vec<u64>,
     sizes: Vec<u32>,
+    /// Votes of the members of each root for its outer side.
+    votes: Vec<Votes>,
+}
+
+/// Votes of the members of a component.
+#[derive(Clone, Copy, Default)]
+struct Votes {
+    /// Sum of the votes, positive if the normal of the root points outward.
+    sum: f32,
+    absolute_sum: f32,
+}
+
+impl Votes {
+    /// Returns true if there are enough votes, and most agree.
+    fn are_certain(self) -> bool {
+        MIN_VOTES <= self.absolute_sum && MIN_AGREEMENT * self.absolute_sum < self.sum.abs()
+    }
 }
 
 impl SignedUnionFind {
-    fn new(n_points: usize) -> Self {
-        Self { parents: (0..n_points as u64).map(|i| i << 1).collect(), sizes: vec![1; n_points] }
+    fn new(n_points: usize, voters: &[Voter]) -> Self {
+        let mut votes = vec![Votes::default(); n_points];
+        for voter in voters {
+            votes[voter.point as usize] = Votes { sum: voter.vote, absolute_sum: voter.vote.abs() };
+        }
+        let parents = (0..n_points as u64).map(|i| i << 1).collect();
+        Self { parents, sizes: vec![1; n_points], votes }
     }
 
     fn find(&mut self, point: u32) -> Member {
@@ -134,17 +170,25 @@ impl SignedUnionFind {
         Ok(members)
     }
 
+    /// Joins the components of two points, unless the votes of both are certain and contradict this.
     fn join(&mut self, a: u32, b: u32, is_opposite: bool) {
         let (a, b) = (self.find(a), self.find(b));
         if a.root == b.root {
             return;
         }
         let is_flipped = a.is_flipped ^ b.is_flipped ^ is_opposite;
+        let sign = if is_flipped { -1.0 } else { 1.0 };
         let (above, below) = (a.root as usize, b.root as usize);
+        let [of_a, of_b] = [self.votes[above], self.votes[below]];
+        if of_a.are_certain() && of_b.are_certain() && sign * of_a.sum * of_b.sum < 0.0 {
+            return;
+        }
         let (above, below) =
             if self.sizes[above] < self.sizes[below] { (below, above) } else { (above, below) };
         self.parents[below] = (above as u64) << 1 | u64::from(is_flipped);
         self.sizes[above] += self.sizes[below];
+        self.votes[above].sum += sign * self.votes[below].sum;
+        self.votes[above].absolute_sum += self.votes[below].absolute_sum;
     }
 }
 
@@ -153,6 +197,7 @@ fn backward_components(
     positions: &[Vec3],
     normals: &[Vec3],
     members: &[Member],
+    votes: &[Votes],
     progress: &dyn Progress,
 ) -> Result<(HashSet<u32>, usize)> {
     let mut components: HashMap<u32, Component> = HashMap::new();
@@ -169,7 +214,11 @@ fn backward_components(
         component.n_points += 1;
     }
     let n_components = components.len();
-    let backward = components.into_iter().filter(|(_, component)| {
+    let backward = components.into_iter().filter(|(root, component)| {
+        let votes = votes[*root as usize];
+        if votes.are_certain() {
+            return votes.sum < 0.0;
+        }
         let sign = if members[component.highest].is_flipped { -1.0 } else { 1.0 };
         let normal = sign * normals[component.highest].as_dvec3();
         let outward =
