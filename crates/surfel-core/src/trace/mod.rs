@@ -20,7 +20,7 @@ pub use query::gaussian_light::GaussianLight;
 pub use query::hit::{Gather, Hit};
 pub use query::splat_query::{Splat, splats};
 pub use query::support::Support;
-pub use query::surface::{implicit_hits_by_discs, occlusions, surface_hits, surface_hits_at};
+pub use query::surface::{occlusions, surface_hits, surface_hits_at};
 pub use query::surface_hit::SurfaceHit;
 pub use scene::instance_filter::InstanceFilter;
 pub use scene::scene_gaussians::scene_gaussians;

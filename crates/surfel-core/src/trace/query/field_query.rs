@@ -1,26 +1,20 @@
-//! The closest hits of rays on the field of weighted planes, found in its kd-tree or in the points' own tree.
+//! The closest hits of rays on the field of weighted planes, found in its kd-tree.
 
-use crate::flat::{FieldLeaf, FlatCloud, FlatPoints};
-use crate::math::{Aabb, LANES, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, set_bits};
-use crate::surface::{CandidateHit, EdgeTest, FIELD_SUPPORT, FieldPoint};
-use crate::trace::query::closest::closest_hits_kernel;
+use crate::flat::FlatCloud;
+use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, set_bits};
+use crate::surface::{CandidateHit, EdgeTest};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::packet_field::{PacketField, PacketZeros};
 use crate::trace::query::ray_field::{FieldHit, RayField, RaySegment};
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::kd_walk::{KdWalk, LeafInterval};
-use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Maximum number of hits of a ray that the edge test rejects. A ray with more is taken to miss.
 pub const MAX_REJECTED_HITS: usize = 48;
 /// Distance behind a rejected hit at which the search restarts, in radii.
 pub const RESTART_OFFSET: f32 = 0.05;
-/// Distance before and behind a disc in which the surface is searched, in radii.
-const DISC_REACH: f32 = 1.0;
-/// Distance from the part of a ray around a disc from which on points are left out, in supports of the disc.
-const GATHER_REACH: f32 = 1.5;
 
 /// Widening of a ray's interval in a leaf, in distances: neighbouring leaves find the zeros between them.
 pub const OVERLAP: f32 = 4.0 * f32::EPSILON;
@@ -34,32 +28,21 @@ impl LeafInterval {
     }
 }
 
-/// A way to the first zero of the field on a ray.
-pub trait FieldSearch: Default {
-    /// Finds the first zero on each ray.
-    fn first_hits<L: Lanes, const HAS_COLORS: bool>(
-        &mut self,
-        cloud: &FlatCloud,
-        rays: &[Ray],
-        hits: &mut [FieldHit],
-    );
-}
-
 /// Finds the closest hit of each ray that the edge test accepts.
 #[inline(always)]
-pub fn field_hits<L: Lanes, S: FieldSearch, const HAS_COLORS: bool>(
+pub fn field_hits<L: Lanes, const HAS_COLORS: bool>(
     cloud: &FlatCloud,
     rays: &[Ray],
     hits: &mut [FieldHit],
 ) {
     hits.fill(FieldHit::MISS);
-    let mut search = S::default();
+    let mut search = KdSearch::default();
     let mut open: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut found = vec![FieldHit::MISS; rays.len()];
     for _ in 0..MAX_REJECTED_HITS {
         let found = &mut found[..rays.len()];
-        let task = FirstHits::<L, S, HAS_COLORS> {
+        let task = FirstHits::<L, HAS_COLORS> {
             search: &mut search,
             cloud,
             rays: &rays,
@@ -118,17 +101,15 @@ fn accepted_lanes<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &[FieldHit]) 
     enclosed_lanes::<L, false>(&cloud.points, lanes, &PacketCandidates::new(&candidates))
 }
 
-struct FirstHits<'a, L, S, const HAS_COLORS: bool> {
-    search: &'a mut S,
+struct FirstHits<'a, L, const HAS_COLORS: bool> {
+    search: &'a mut KdSearch,
     cloud: &'a FlatCloud,
     rays: &'a [Ray],
     hits: &'a mut [FieldHit],
     lanes: PhantomData<L>,
 }
 
-impl<L: Lanes, S: FieldSearch, const HAS_COLORS: bool> SimdTask
-    for FirstHits<'_, L, S, HAS_COLORS>
-{
+impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FirstHits<'_, L, HAS_COLORS> {
     type Output = ();
 
     #[inline(always)]
@@ -140,14 +121,15 @@ impl<L: Lanes, S: FieldSearch, const HAS_COLORS: bool> SimdTask
 
 /// The search in the field's kd-tree, leaf by leaf. Rays of a packet that are in the same leaf are searched together.
 #[derive(Default)]
-pub struct KdSearch {
+struct KdSearch {
     field: RayField,
 }
 
 /// Minimum number of rays in a leaf that are searched together.
 const MIN_PACKET_RAYS: u32 = 3;
 
-impl FieldSearch for KdSearch {
+impl KdSearch {
+    /// Finds the first zero on each ray.
     #[inline(always)]
     fn first_hits<L: Lanes, const HAS_COLORS: bool>(
         &mut self,
@@ -252,117 +234,5 @@ fn take_zeros<W: PacketLanes, const HAS_COLORS: bool>(
         let normal = Vec3::new(x[lane], y[lane], z[lane]);
         let color = (Vec3::new(r[lane], g[lane], b[lane]), weights[lane]);
         hits[lane] = FieldHit::new::<HAS_COLORS>(cloud, &rays[lane], hit, normal, color);
-    }
-}
-
-/// The search in the points' tree: near the discs that a ray hits, one after the other.
-#[derive(Default)]
-pub struct DiscSearch {
-    field: RayField,
-    blocks: Vec<u32>,
-    lanes: Vec<u8>,
-    flips: Vec<u8>,
-}
-
-impl FieldSearch for DiscSearch {
-    #[inline(always)]
-    fn first_hits<L: Lanes, const HAS_COLORS: bool>(
-        &mut self,
-        cloud: &FlatCloud,
-        rays: &[Ray],
-        hits: &mut [FieldHit],
-    ) {
-        hits.fill(FieldHit::MISS);
-        let mut open: Vec<usize> = (0..rays.len()).collect();
-        let mut left = rays.to_vec();
-        let mut discs = vec![Hit::MISS; rays.len()];
-        while !left.is_empty() {
-            closest_hits_kernel::<L>(cloud, &left, &mut discs[..left.len()]);
-            let mut n_left = 0;
-            for i in 0..left.len() {
-                let (disc, ray_idx) = (discs[i], open[i]);
-                if disc.is_miss() {
-                    continue;
-                }
-                hits[ray_idx] = self.hit_near_disc::<L, HAS_COLORS>(cloud, &rays[ray_idx], &disc);
-                if hits[ray_idx].hit.is_miss() {
-                    let t_min = (disc.distance + RESTART_OFFSET * cloud.points.radius(disc.slot))
-                        .max(disc.distance * (1.0 + 2.0 * f32::EPSILON));
-                    (left[n_left], open[n_left]) = (Ray { t_min, ..left[i] }, ray_idx);
-                    n_left += 1;
-                }
-            }
-            left.truncate(n_left);
-        }
-    }
-}
-
-impl DiscSearch {
-    /// Finds the first zero near the disc that a ray hits.
-    #[inline(always)]
-    fn hit_near_disc<L: Lanes, const HAS_COLORS: bool>(
-        &mut self,
-        cloud: &FlatCloud,
-        ray: &Ray,
-        disc: &Hit,
-    ) -> FieldHit {
-        let radius = cloud.points.radius(disc.slot);
-        let reach = DISC_REACH * radius;
-        let (from, to) = (disc.distance - reach, disc.distance + reach);
-        let part = RaySegment { start: from, length: to - from };
-        let region = Aabb::of_points([ray.at(from), ray.at(to)]);
-        let reach = Vec3::splat(GATHER_REACH * FIELD_SUPPORT * radius);
-        let region = Aabb { min: region.min - reach, max: region.max + reach };
-        let Self { field, blocks, lanes, flips } = self;
-        blocks.clear();
-        lanes.clear();
-        flips.clear();
-        let guide = (!cloud.has_known_sides()).then(|| field_point(&cloud.points, disc.slot));
-        let mut collector = Collector { region: &region, guide, blocks, lanes, flips };
-        query_box::<L>(
-            &cloud.points,
-            &region,
-            &mut CollectBlocks::<L>(&mut collector, PhantomData),
-        );
-        let leaf = FieldLeaf { blocks, lanes, flips };
-        let found = field.first_hit::<L, HAS_COLORS>(cloud, &leaf, ray, part);
-        found.unwrap_or(FieldHit::MISS)
-    }
-}
-
-fn field_point(points: &FlatPoints, slot: u32) -> FieldPoint {
-    let support = FIELD_SUPPORT * points.radius(slot);
-    FieldPoint { center: points.center(slot), normal: points.normal(slot), support }
-}
-
-struct Collector<'a> {
-    region: &'a Aabb,
-    /// The point to whose side normals are turned.
-    guide: Option<FieldPoint>,
-    blocks: &'a mut Vec<u32>,
-    lanes: &'a mut Vec<u8>,
-    flips: &'a mut Vec<u8>,
-}
-
-struct CollectBlocks<'a, 'b, L>(&'b mut Collector<'a>, PhantomData<L>);
-
-impl<L: Lanes> BoxVisitor for CollectBlocks<'_, '_, L> {
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let collector = &mut *self.0;
-        let inside = points.blocks[block_idx as usize].lanes_within::<L>(collector.region);
-        if inside == 0 {
-            return;
-        }
-        let mut flips = 0;
-        if let Some(guide) = &collector.guide {
-            for lane in set_bits::<LANES>(inside) {
-                let point = field_point(points, block_idx * LANES as u32 + lane as u32);
-                flips |= u8::from(point.is_flipped(guide)) << lane;
-            }
-        }
-        collector.blocks.push(block_idx);
-        collector.lanes.push(inside as u8);
-        collector.flips.push(flips);
     }
 }

@@ -1,12 +1,12 @@
 //! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
 
 use crate::flat::{FlatCloud, FlatPoints};
-use crate::math::{Lanes, Ray};
+use crate::math::{Lanes, Ray, Vec3};
 use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::edge_filter::EdgeFilter;
-use crate::trace::query::field_query::{DiscSearch, FieldSearch, KdSearch, field_hits};
+use crate::trace::query::field_query::field_hits;
 use crate::trace::query::gaussian_hits::{gaussian_hits, gaussian_occlusions};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
@@ -60,7 +60,7 @@ fn surface_hits_kernel<L: Lanes>(
     if !cloud.points.nodes.is_empty() {
         match cloud.surface {
             SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
-            SurfaceKind::Implicit => trace_field::<L, KdSearch>(cloud, rays, hits),
+            SurfaceKind::Implicit => trace_field::<L>(cloud, rays, hits),
             SurfaceKind::Octree => trace_octree::<L, true>(cloud, pixel, rays, hits),
             SurfaceKind::OctreeSplat => trace_octree::<L, false>(cloud, pixel, rays, hits),
             SurfaceKind::Mls => trace_mls::<L>(cloud, rays, hits),
@@ -78,49 +78,14 @@ fn surface_hits_kernel<L: Lanes>(
     }
 }
 
-/// Finds what `surface_hits` does for a cloud of the kind [`SurfaceKind::Implicit`], without its kd-tree: the field is
-/// searched near the discs that rays hit in the tree of the points.
-pub fn implicit_hits_by_discs(
-    cloud: &FlatCloud,
-    simd: Simd,
-    rays: &[Ray],
-    hits: &mut [SurfaceHit],
-) {
-    if cloud.points.nodes.is_empty() {
-        return hits.fill(SurfaceHit::MISS);
-    }
-    dispatch_simd!(
-        simd,
-        implicit_hits_by_discs_kernel(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
-    );
-}
-
 #[inline(always)]
-fn implicit_hits_by_discs_kernel<L: Lanes>(
-    cloud: &FlatCloud,
-    rays: &[Ray],
-    hits: &mut [SurfaceHit],
-) {
-    trace_field::<L, DiscSearch>(cloud, rays, hits);
-}
-
-#[inline(always)]
-fn trace_field<L: Lanes, S: FieldSearch>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+fn trace_field<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     let mut found = vec![FieldHit::MISS; rays.len()];
-    field_hits::<L, S, true>(cloud, rays, &mut found);
+    field_hits::<L, true>(cloud, rays, &mut found);
     for ((ray, FieldHit { hit, normal, color }), result) in rays.iter().zip(found).zip(hits) {
-        *result = SurfaceHit::MISS;
         if !hit.is_miss() {
-            *result = SurfaceHit {
-                distance: hit.distance,
-                id: cloud.points.id(hit.slot),
-                slot: hit.slot,
-                radius: cloud.points.radius(hit.slot),
-                normal,
-                color,
-                surface: cloud.surface,
-                is_backface: 0.0 < cloud.points.normal(hit.slot).dot(ray.direction),
-            };
+            let radius = cloud.points.radius(hit.slot);
+            *result = surface_hit(cloud, ray, &hit, radius, (normal, color));
         }
     }
 }
@@ -135,19 +100,10 @@ fn trace_octree<L: Lanes, const HAS_CORNERS: bool>(
     let mut found = vec![CellHit::MISS; rays.len()];
     octree_hits::<L, HAS_CORNERS>(cloud, pixel, rays, &mut found);
     for ((ray, CellHit { hit, normal, size }), result) in rays.iter().zip(found).zip(hits) {
-        *result = SurfaceHit::MISS;
         if !hit.is_miss() {
-            *result = SurfaceHit {
-                distance: hit.distance,
-                id: cloud.points.id(hit.slot),
-                slot: hit.slot,
-                // New rays keep their distance from cells that are larger than the discs.
-                radius: cloud.points.radius(hit.slot).max(size),
-                normal,
-                color: cell_color(cloud, hit.slot),
-                surface: cloud.surface,
-                is_backface: 0.0 < cloud.points.normal(hit.slot).dot(ray.direction),
-            };
+            // New rays keep their distance from cells that are larger than the discs.
+            let radius = cloud.points.radius(hit.slot).max(size);
+            *result = surface_hit(cloud, ray, &hit, radius, (normal, cell_color(cloud, hit.slot)));
         }
     }
 }
@@ -191,7 +147,7 @@ fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut 
         }
         SurfaceKind::Implicit => {
             let mut hits = vec![FieldHit::MISS; rays.len()];
-            field_hits::<L, KdSearch, false>(cloud, rays, &mut hits);
+            field_hits::<L, false>(cloud, rays, &mut hits);
             occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
         }
         SurfaceKind::Octree => octree_occlusions::<L, true>(cloud, rays, occluded),
@@ -280,19 +236,10 @@ fn trace_mls<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
     for ((hit, ray), MlsHit { hit: nearest, radius, normal, color }) in
         hits.iter_mut().zip(rays).zip(found)
     {
-        if nearest.is_miss() {
-            continue;
+        if !nearest.is_miss() {
+            let radius = radius / cloud.radius_factor();
+            *hit = surface_hit(cloud, ray, &nearest, radius, (normal, color));
         }
-        *hit = SurfaceHit {
-            distance: nearest.distance,
-            id: cloud.points.id(nearest.slot),
-            slot: nearest.slot,
-            radius: radius / cloud.radius_factor(),
-            normal,
-            color,
-            surface: cloud.surface,
-            is_backface: 0.0 < cloud.points.normal(nearest.slot).dot(ray.direction),
-        };
     }
 }
 
@@ -305,7 +252,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
         let mut splats = vec![Splat::MISS; rays.len()];
         SplatTracer::new(cloud, cloud.surface, EdgeTest::Off).trace::<L>(rays, &mut splats);
         for ((hit, ray), splat) in hits.iter_mut().zip(rays).zip(&splats) {
-            *hit = surface_hit(cloud, ray, splat);
+            *hit = splat_hit(cloud, ray, splat);
         }
         return;
     }
@@ -322,7 +269,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
             if splat.hit.is_miss() {
                 continue;
             }
-            let found = surface_hit(cloud, &ray, splat);
+            let found = splat_hit(cloud, &ray, splat);
             if splat.is_dense && (splat.is_enclosed || !tests_edge) {
                 hits[ray_idx as usize] = found;
                 continue;
@@ -339,19 +286,33 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
 }
 
 #[inline(always)]
-fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
+fn splat_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
     if splat.hit.is_miss() {
         return SurfaceHit::MISS;
     }
+    let hit = Hit { distance: splat.distance, slot: splat.hit.slot };
+    let radius = splat.radius / cloud.radius_factor();
+    surface_hit(cloud, ray, &hit, radius, (splat.normal, splat.color))
+}
+
+/// Returns the hit of a ray on the surface of a cloud, near the point of `hit`.
+#[inline(always)]
+fn surface_hit(
+    cloud: &FlatCloud,
+    ray: &Ray,
+    hit: &Hit,
+    radius: f32,
+    (normal, color): (Vec3, Vec3),
+) -> SurfaceHit {
     SurfaceHit {
-        distance: splat.distance,
-        id: cloud.points.id(splat.hit.slot),
-        slot: splat.hit.slot,
-        radius: splat.radius / cloud.radius_factor(),
-        normal: splat.normal,
-        color: splat.color,
+        distance: hit.distance,
+        id: cloud.points.id(hit.slot),
+        slot: hit.slot,
+        radius,
+        normal,
+        color,
         surface: cloud.surface,
-        is_backface: 0.0 < cloud.points.normal(splat.hit.slot).dot(ray.direction),
+        is_backface: 0.0 < cloud.points.normal(hit.slot).dot(ray.direction),
     }
 }
 
@@ -360,7 +321,6 @@ mod tests {
     //! Planes fitted to points without normals lie on a sphere.
 
     use super::*;
-    use crate::math::Vec3;
     use crate::points::{PointCloud, Preparation, StructureChoice, prepare};
     use crate::progress::NoProgress;
     use crate::scene::CloudGeometry;
