@@ -1,6 +1,9 @@
 //! Direct lighting: sun, sky, environments and punctual lights with their shadows, and the headlight.
 
 use super::batch::RayCounts;
+use super::dimensions::{
+    ENVIRONMENT_DIRECTION, PUNCTUAL_LIGHT_POSITION, SKY_DIRECTION, SKY_DISTANCE, SUN_DIRECTION,
+};
 use super::media::{MediumRay, MediumStack};
 use super::shading::Shading;
 use super::specular::{MIN_GGX_COS, ggx_specular};
@@ -44,16 +47,6 @@ pub struct DirectLight<'a> {
     pub max_light_samples: u32,
 }
 
-/// Random dimension of directions toward the sky. No two uses share random numbers.
-pub const SKY_DIRECTION: u64 = 1;
-/// Random dimension of the ends of rays toward the sky.
-pub const SKY_DISTANCE: u64 = 2;
-/// Random dimension of directions toward suns.
-pub const SUN_DIRECTION: u64 = 3;
-/// Random dimension of directions toward environments.
-pub const ENVIRONMENT_DIRECTION: u64 = 4;
-/// Random dimension of positions on punctual lights.
-pub const PUNCTUAL_LIGHT_POSITION: u64 = 5;
 /// Approximate number of shadow rays traced at once: it bounds their memory, whatever the number of light
 /// samples.
 const SHADOW_RAY_CHUNK_SIZE: u32 = 1 << 14;

@@ -3,11 +3,12 @@
 //! Each integrator is one file behind [`Integrator`]; `whitted` is the only one so far. The other files
 //! serve all integrators: `batch` (the trait and its arguments), `shading` (material and normals at a
 //! hit), `media` (nested dielectrics and absorption), `specular` (Fresnel and GGX), `background` (radiance
-//! of rays that leave the scene), `transmittance` (shadow rays through glass) and `direct` (direct
-//! lighting).
+//! of rays that leave the scene), `transmittance` (shadow rays through glass), `dimensions` (which random
+//! numbers are drawn for what) and `direct` (direct lighting).
 
 mod background;
 mod batch;
+mod dimensions;
 mod direct;
 mod media;
 mod shading;

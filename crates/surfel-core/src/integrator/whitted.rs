@@ -2,6 +2,7 @@
 
 use super::background::background_radiance;
 use super::batch::{CameraRayBatch, Integrator, RayCounts};
+use super::dimensions::{ALPHA_LAYER, LOBE_DIRECTION, REFLECTED, REFRACTED, ROULETTE};
 use super::direct::{DirectLight, ShadingPoint};
 use super::media::{Interface, MediumRay};
 use super::shading::Shading;
@@ -28,17 +29,6 @@ pub const MIN_WEIGHT: f32 = 0.01;
 
 /// Approximate maximum number of paths in a wavefront. A path takes about half a kilobyte with its ray, hit and shading.
 const MAX_WAVE_SIZE: usize = 1 << 15;
-
-/// Random dimension of directions in a rough lobe.
-pub const LOBE_DIRECTION: u64 = 11;
-/// Random dimension of Russian roulette.
-pub const ROULETTE: u64 = 12;
-/// Random dimension of reflected branches.
-pub const REFLECTED: u64 = 13;
-/// Random dimension of refracted branches.
-pub const REFRACTED: u64 = 14;
-/// Random dimension of branches behind an alpha-blended layer.
-pub const ALPHA_LAYER: u64 = 15;
 
 /// A path from the camera up to its next ray.
 #[derive(Clone, Copy)]
