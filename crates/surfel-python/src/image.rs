@@ -9,7 +9,7 @@ use pyo3::types::PyBytes;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 use surfel::RenderedImage;
-use surfel_core::image::{Aovs, Image, encode_srgb8};
+use surfel_core::image::{Aovs, Image, encode_srgba8};
 use surfel_core::math::{DVec3, Vec3};
 
 /// A rendered picture. Row 0 is the top; arrays are read-only and shared with the picture.
@@ -198,11 +198,5 @@ fn world_positions(aovs: &Aovs, origin: DVec3) -> Vec<f64> {
 }
 
 fn encoded(image: &Image) -> Vec<u8> {
-    let pixel = |[r, g, b, a]: &[f32; 4]| {
-        let scale = if 0.0 < *a { a.recip() } else { 0.0 };
-        let alpha = (255.0 * a.clamp(0.0, 1.0)).round() as u8;
-        let [r, g, b] = [r, g, b].map(|channel| encode_srgb8(channel * scale));
-        [r, g, b, alpha]
-    };
-    image.color.iter().flat_map(pixel).collect()
+    image.color.iter().flat_map(|pixel| encode_srgba8(*pixel)).collect()
 }

@@ -2,7 +2,7 @@
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use rayon::prelude::*;
-use surfel_core::image::{decode_srgb8, encode_srgb8};
+use surfel_core::image::{decode_srgb8, encode_srgb8, encode_srgba8};
 
 /// Background of the page behind a transparent picture, as sRGB codes.
 const PAGE_BACKGROUND: [u8; 3] = [48, 50, 54];
@@ -45,7 +45,7 @@ pub fn png(pixels: Pixels) -> Vec<u8> {
     let (color, bytes) = if is_opaque {
         (png::ColorType::Rgb, bytes(pixels, |[r, g, b, _]| [r, g, b].map(encode_srgb8)))
     } else {
-        (png::ColorType::Rgba, bytes(pixels, unpremultiply))
+        (png::ColorType::Rgba, bytes(pixels, encode_srgba8))
     };
     let mut out = Vec::with_capacity(bytes.len() / 2);
     let mut encoder =
@@ -57,12 +57,6 @@ pub fn png(pixels: Pixels) -> Vec<u8> {
     // Writing to memory does not fail.
     debug_assert!(written.is_ok(), "{written:?}");
     out
-}
-
-fn unpremultiply([r, g, b, a]: [f32; 4]) -> [u8; 4] {
-    let opacity = if 0.0 < a { a.min(1.0) } else { 1.0 };
-    let [r, g, b] = [r, g, b].map(|channel| encode_srgb8(channel / opacity));
-    [r, g, b, (255.0 * a.clamp(0.0, 1.0)).round() as u8]
 }
 
 fn bytes<const N: usize>(pixels: Pixels, encode: impl Fn([f32; 4]) -> [u8; N] + Sync) -> Vec<u8> {

@@ -8,7 +8,9 @@ mod srgb;
 pub use classification::{class_color, class_name};
 pub use colormap::Colormap;
 pub use percentile_range::PercentileRange;
-pub use srgb::{decode_srgb, decode_srgb8, encode_srgb, encode_srgb8};
+pub use srgb::{
+    decode_srgb, decode_srgb8, encode_srgb, encode_srgb8, encode_srgba8, unpremultiply,
+};
 
 use crate::math::Vec3;
 

@@ -30,6 +30,21 @@ pub fn encode_srgb8(linear: f32) -> u8 {
     TABLE.code(linear)
 }
 
+/// Returns a pixel whose colour is not multiplied by alpha, which is clamped to [0, 1]. Without alpha, as light alone has
+/// it, the colour stays.
+pub fn unpremultiply([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    let a = a.clamp(0.0, 1.0);
+    let opacity = if 0.0 < a { a } else { 1.0 };
+    [r / opacity, g / opacity, b / opacity, a]
+}
+
+/// Encodes a linear pixel with premultiplied alpha as 8-bit sRGB and alpha, which multiplies no more.
+pub fn encode_srgba8(pixel: [f32; 4]) -> [u8; 4] {
+    let [r, g, b, a] = unpremultiply(pixel);
+    // The cast maps NaN to 0.
+    [encode_srgb8(r), encode_srgb8(g), encode_srgb8(b), (a * 255.0 + 0.5) as u8]
+}
+
 /// The table of `encode_srgb8`.
 struct CodeTable {
     /// Lowest code of each range of floats that share their upper bits, from `FIRST` to 1.
@@ -93,6 +108,15 @@ mod tests {
         for (odd, code) in [(-1.0, 0), (7.0, 255), (f32::NAN, 0), (f32::INFINITY, 255)] {
             assert_eq!(encode_srgb8(odd), code);
         }
+    }
+
+    #[test]
+    fn colours_are_divided_by_alpha_within_its_range() {
+        let gray = decode_srgb8(100);
+        assert_eq!(encode_srgba8([0.5 * gray, 0.0, 0.5, 0.5]), [100, 0, 255, 128]);
+        // Sums of samples may exceed 1 by rounding.
+        assert_eq!(encode_srgba8([gray, gray, 1.0, 1.01]), [100, 100, 255, 255]);
+        assert_eq!(encode_srgba8([gray, 0.0, 0.0, 0.0]), [100, 0, 0, 0]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::Path;
 
-use surfel_core::image::{Image, encode_srgb, encode_srgb8};
+use surfel_core::image::{Image, encode_srgb, encode_srgb8, encode_srgba8, unpremultiply};
 
 use super::options::{Alpha, BitDepth, ImageOptions};
 use crate::error::Result;
@@ -107,24 +107,25 @@ fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Resu
 pub(super) fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     let quantize16 = |encoded: f32| ((encoded * 65535.0 + 0.5) as u16).to_be_bytes();
-    for &[r, g, b, a] in &image.color {
-        let a = a.clamp(0.0, 1.0);
-        let opacity = match options.alpha {
-            Alpha::Keep if 0.0 < a => a,
-            _ => 1.0,
-        };
-        for channel in [r, g, b] {
-            let linear = channel / opacity;
-            match options.depth {
-                BitDepth::Eight => bytes.push(encode_srgb8(linear)),
-                // The cast maps NaN to 0.
-                BitDepth::Sixteen => bytes.extend(quantize16(encode_srgb(linear.clamp(0.0, 1.0)))),
-            }
+    for pixel in &image.color {
+        if (options.alpha, options.depth) == (Alpha::Keep, BitDepth::Eight) {
+            bytes.extend(encode_srgba8(*pixel));
+            continue;
         }
-        match (options.alpha, options.depth) {
-            (Alpha::Drop, _) => {}
-            (Alpha::Keep, BitDepth::Eight) => bytes.push((a * 255.0 + 0.5) as u8),
-            (Alpha::Keep, BitDepth::Sixteen) => bytes.extend(quantize16(a)),
+        let [r, g, b, a] = match options.alpha {
+            Alpha::Keep => unpremultiply(*pixel),
+            Alpha::Drop => *pixel,
+        };
+        match options.depth {
+            BitDepth::Eight => bytes.extend([r, g, b].map(encode_srgb8)),
+            BitDepth::Sixteen => {
+                // The cast maps NaN to 0.
+                let encode = |linear: f32| quantize16(encode_srgb(linear.clamp(0.0, 1.0)));
+                bytes.extend([r, g, b].map(encode).as_flattened());
+                if options.alpha == Alpha::Keep {
+                    bytes.extend(quantize16(a));
+                }
+            }
         }
     }
     bytes
