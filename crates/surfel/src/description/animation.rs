@@ -88,7 +88,7 @@ settings! {
         seconds: f64, SECONDS, "SECONDS";
         /// Turns of an orbit; negative ones go clockwise as the axis points to the viewer.
         turns: f64 = 1.0, TURNS, "N";
-        /// Axis of an orbit [default: up].
+        /// Axis of an orbit, in the coordinates of the parent [default: up].
         axis: DVec3, Vector, "X,Y,Z";
         /// Center of an orbit, in the coordinates of the parent [default: the object's own origin].
         center: DVec3, Vector, "X,Y,Z";
@@ -127,6 +127,8 @@ pub struct ObjectMotion {
     pub is_orbit: bool,
     /// That point in the coordinates of the parent; `None` is the object's own origin.
     pub pivot: Option<DVec3>,
+    /// True if the axis is the scene's up, which is chosen later: the tracks turn about +Z.
+    pub is_about_up: bool,
 }
 
 /// The movement of the camera, in world coordinates.
@@ -237,13 +239,16 @@ impl AnimationDescription {
     /// Fails for missing keys, and for lists of different lengths.
     pub fn object_motion(&self) -> Result<ObjectMotion, Invalid> {
         let object = self.object.clone().unwrap_or_default();
-        let mut motion = ObjectMotion { object, tracks: Vec::new(), is_orbit: false, pivot: None };
+        let (tracks, pivot) = (Vec::new(), None);
+        let mut motion =
+            ObjectMotion { object, tracks, is_orbit: false, pivot, is_about_up: false };
         match self.kind() {
             AnimationKind::Keys => motion.tracks = self.tracks()?,
             AnimationKind::Path => motion.tracks.push(Track::Translation(self.path()?)),
             AnimationKind::Orbit => {
                 let Orbit { seconds, turns, axis } = self.orbit()?;
                 motion.is_orbit = true;
+                motion.is_about_up = axis.is_none();
                 motion.pivot = self.center;
                 let turn = orbit(axis.unwrap_or(DVec3::Z), turns, seconds);
                 motion.tracks.push(Track::Rotation(turn));

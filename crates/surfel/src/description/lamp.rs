@@ -34,7 +34,7 @@ settings! {
         name: String, Text, "NAME";
         /// point, spot, or directional: parallel light from infinitely far away.
         kind: LampShape = LampShape::Point, SHAPES, "KIND";
-        /// Position; of a directional lamp only the direction to the target counts.
+        /// Position; of a directional lamp only the direction to the target counts [default of such: above].
         position: DVec3, Vector, "X,Y,Z";
         /// Point that spots and directional lamps shine at.
         target: DVec3 = DVec3::ZERO, Vector, "X,Y,Z";
@@ -68,7 +68,12 @@ impl LampDescription {
         Ok(lamp)
     }
 
-    /// Returns a node at the lamp's position that shines toward its target.
+    /// Returns true if the lamp shines from above, wherever that is.
+    pub fn shines_from_above(&self) -> bool {
+        self.kind() == LampShape::Directional && self.position.is_none()
+    }
+
+    /// Returns a node at the lamp's position that shines toward its target, from +Z if it shines from above.
     ///
     /// # Errors
     ///
@@ -86,7 +91,7 @@ impl LampDescription {
         let target = self.target();
         let position = match (self.position, kind) {
             (Some(position), _) => position,
-            // Parallel light comes from above unless a position says otherwise.
+            // Parallel light comes from above unless a position says otherwise. Up is chosen later.
             (None, PunctualLightKind::Directional) => target + DVec3::Z,
             (None, _) => return Err(Invalid::at("position", "is missing; expected [x, y, z]")),
         };

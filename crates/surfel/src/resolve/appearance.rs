@@ -35,6 +35,7 @@ pub fn finish_graph(
         apply_surface_and_color(cloud, &settings, up, progress)
             .map_err(|cause| scene.content_error(geometry, description, cause))
     })?;
+    scene.up_parts.turn(&mut graph, up);
     for (node, is_visible) in scene.visibility(&graph, description) {
         graph.nodes[node].is_visible = is_visible;
     }

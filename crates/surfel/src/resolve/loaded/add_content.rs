@@ -240,6 +240,9 @@ impl LoadedScene {
             let mut middle = Node { parent: node.parent, ..Node::new("") };
             middle.transform = Transform::from_translation(center);
             let middle = self.graph.add_node(middle);
+            if motion.is_about_up {
+                self.up_parts.orbits.push(self.graph.animation.channels.len());
+            }
             self.add_tracks(middle, motion);
             // Back again, so that the node's own keys count from where they always do.
             let mut back = Node { parent: Some(middle), ..Node::new("") };

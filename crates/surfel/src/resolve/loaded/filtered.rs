@@ -56,6 +56,7 @@ impl LoadedScene {
             file_ends: self.file_ends.clone(),
             keeps_all_columns: self.keeps_all_columns,
             is_filtered: true,
+            up_parts: self.up_parts.clone(),
         })
     }
 }

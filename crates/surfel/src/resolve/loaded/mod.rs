@@ -4,6 +4,7 @@ mod add_content;
 mod checks;
 mod filtered;
 mod shown_points;
+mod up_parts;
 mod without_effect;
 
 pub(crate) use without_effect::report_unused_of_files;
@@ -27,6 +28,7 @@ use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
 use surfel_core::words::counted;
 use surfel_formats::FileInfo;
+use up_parts::UpParts;
 
 /// The content of the files of a description, before it is prepared.
 ///
@@ -56,6 +58,8 @@ pub struct LoadedScene {
     keeps_all_columns: bool,
     /// True if points that the description does not keep were dropped.
     is_filtered: bool,
+    /// Parts of the graph that depend on up.
+    pub(super) up_parts: UpParts,
 }
 
 /// The content of a file, and what was unusual about it.
@@ -121,6 +125,7 @@ impl LoadedScene {
             file_ends: BTreeMap::new(),
             keeps_all_columns: keep.all_columns,
             is_filtered: !keep.all_columns,
+            up_parts: UpParts::default(),
         };
         let motions = object_motions(description)?;
         scene.add_files(description, progress)?;
@@ -128,7 +133,10 @@ impl LoadedScene {
             scene.add_object(object, description, &motions, progress)?;
         }
         for lamp in &description.lamps {
-            scene.add_animated(lamp.node()?, &motions);
+            let node = scene.add_animated(lamp.node()?, &motions);
+            if lamp.shines_from_above() {
+                scene.up_parts.lamps.push(node);
+            }
         }
         let summary = content_summary(&scene.graph);
         let names = list_files(&scene.all_files(description));
