@@ -112,6 +112,20 @@ impl RayRows<'_> {
     }
 }
 
+/// The nearest surfaces on rays, as Python has them. Ids are `NO_ID` where there is none.
+pub struct HitColumns {
+    /// Distance in multiples of the length of the direction; infinite without a hit.
+    t_hit: Vec<f32>,
+    /// Number of what was added.
+    geometry_ids: Vec<u32>,
+    /// Index of the triangle, or of the nearest point.
+    primitive_ids: Vec<u32>,
+    /// Index of the nearest point.
+    point_ids: Vec<u32>,
+    /// Unit normal that faces the ray's origin.
+    normals: Vec<[f32; 3]>,
+}
+
 /// Rays that are cast at a view. Each answer is in the order of the array.
 pub struct ViewRays<'a> {
     view: &'a LiveView,
@@ -123,23 +137,36 @@ pub struct ViewRays<'a> {
 
 impl<'a> ViewRays<'a> {
     /// Rays at a view, of which the part `t_range` counts.
-    pub fn new(rows: RayRows<'a>, t_range: (f32, f32), view: &'a LiveView, simd: Simd) -> Self {
-        Self { view, caster: view.ray_caster(simd), rays: rows.in_scene(view, t_range), rows }
+    ///
+    /// # Errors
+    ///
+    /// Fails for views of round points, which have no surface.
+    pub fn new(
+        rows: RayRows<'a>,
+        t_range: (f32, f32),
+        view: &'a LiveView,
+        simd: Simd,
+    ) -> surfel::Result<Self> {
+        let caster = view.ray_caster(simd)?;
+        Ok(Self { view, caster, rays: rows.in_scene(view, t_range), rows })
     }
 
-    /// Finds the nearest surfaces; the instances of the hits are the numbers of what was added.
-    pub fn hits(&self, progress: &dyn Progress) -> surfel::Result<RayHits> {
-        let RayHits { t_hit, mut instances, primitives, normals, points } =
+    /// Finds the nearest surfaces.
+    pub fn hits(&self, progress: &dyn Progress) -> surfel::Result<HitColumns> {
+        let RayHits { t_hit, instances, triangles, points, normals } =
             self.caster.hits(&self.rays, progress)?;
         let contents = self.view.contents();
         let content = |instance: u32| contents.get(instance as usize).copied().unwrap_or(NO_ID);
-        instances.par_iter_mut().for_each(|instance| *instance = content(*instance));
-        Ok(RayHits {
+        let (mut geometry_ids, mut primitive_ids) = (instances, triangles);
+        geometry_ids.par_iter_mut().for_each(|id| *id = content(*id));
+        // The number of no triangle is greater than that of any point.
+        primitive_ids.par_iter_mut().zip(&points).for_each(|(id, point)| *id = (*id).min(*point));
+        Ok(HitColumns {
             t_hit: self.rows.restored(t_hit),
-            instances: self.rows.restored(instances),
-            primitives: self.rows.restored(primitives),
+            geometry_ids: self.rows.restored(geometry_ids),
+            primitive_ids: self.rows.restored(primitive_ids),
+            point_ids: self.rows.restored(points),
             normals: self.rows.restored(normals),
-            points: self.rows.restored(points),
         })
     }
 
@@ -209,15 +236,15 @@ fn tile_row(height: u32, width: u32) -> Vec<u32> {
 pub fn ray_hits<'py>(
     py: Python<'py>,
     shape: &[usize],
-    hits: RayHits,
+    hits: HitColumns,
 ) -> PyResult<Bound<'py, PyDict>> {
     let vectors = shape.iter().copied().chain([3]).collect();
     let normals = bytemuck::cast_vec::<[f32; 3], f32>(hits.normals);
     let all = PyDict::new(py);
     all.set_item("t_hit", owned_array(py, hits.t_hit, shape.to_vec())?)?;
-    all.set_item("geometry_ids", owned_array(py, hits.instances, shape.to_vec())?)?;
-    all.set_item("primitive_ids", owned_array(py, hits.primitives, shape.to_vec())?)?;
+    all.set_item("geometry_ids", owned_array(py, hits.geometry_ids, shape.to_vec())?)?;
+    all.set_item("primitive_ids", owned_array(py, hits.primitive_ids, shape.to_vec())?)?;
     all.set_item("primitive_normals", owned_array(py, normals, vectors)?)?;
-    all.set_item("point_ids", owned_array(py, hits.points, shape.to_vec())?)?;
+    all.set_item("point_ids", owned_array(py, hits.point_ids, shape.to_vec())?)?;
     Ok(all)
 }

@@ -20,11 +20,11 @@ use surfel::live_scene::LiveScene;
 use surfel::live_view::LiveView;
 use surfel::overlay::faults;
 use surfel::progress_log::Choice;
+use surfel::ray_query::WHOLE_RAY;
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::{Image, NO_ID, class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
-use surfel_core::render::uses_rasterizer;
 use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
 use surfel_core::words::counted;
@@ -40,9 +40,6 @@ struct State {
     /// The scene as it was read; none until it is needed, and after something was added.
     opened: SceneSlot,
 }
-
-/// All of a ray, from its origin without end.
-const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
 
 impl PyScene {
     fn new(description: SceneDescription) -> Self {
@@ -104,14 +101,10 @@ impl PyScene {
         let py = rays.py();
         let (scene, chosen) = self.open_view(py, None, progress)?;
         let view = &chosen.view;
-        if uses_rasterizer(&view.flat).unwrap_or(false) {
-            let advice = "points have no surface that rays meet; choose another, as `smooth`";
-            return Err(invalid_setting(py, Invalid::at("surface", advice)));
-        }
         rays.with_rows(|rows| {
             work::run(py, progress, |progress| {
                 scene.install(progress, |scene| {
-                    query(&ViewRays::new(rows, t_range, view, scene.simd()), progress)
+                    query(&ViewRays::new(rows, t_range, view, scene.simd())?, progress)
                 })
             })
         })

@@ -15,7 +15,7 @@ fn main() -> surfel::Result<()> {
         |axis: usize, i: usize| low[axis] + (i as f64 + 0.5) / n as f64 * (high[axis] - low[axis]);
     let ray = |i: usize| [at(0, i % n), at(1, i / n), high[2] + 1.0, 0.0, 0.0, -1.0];
     let rays: Vec<[f64; 6]> = (0..n * n).map(ray).collect();
-    for (ray, hit) in rays.iter().zip(scene.cast_rays(&rays)) {
+    for (ray, hit) in rays.iter().zip(scene.cast_rays(&rays)?) {
         match hit {
             Some(hit) => println!(
                 "{:.2} {:.2}: height {:.3}, point {:?}",

@@ -4,14 +4,14 @@ use crate::crs::{CoordinateSystem, georeference};
 use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
-use crate::picture::{RenderedImage, image_options};
-use crate::progress_log::{CancelOnly, Choice};
+use crate::picture::RenderedImage;
+use crate::progress_log::{CancelOnly, Choice, ProgressLog};
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
     Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps, expose_materials,
 };
-use surfel_core::flat::{FlatPunctualLight, FlatScene};
-use surfel_core::math::{DQuat, Vec3};
+use surfel_core::flat::{FlatPunctualLight, FlatScene, Instance};
+use surfel_core::math::{Aabb, DQuat, Vec3};
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::render::{RenderStats, Renderer, Settings};
 use surfel_core::scene::{Camera, ClipPlane, Geometry, Graph, Light, Room};
@@ -120,6 +120,20 @@ pub(crate) fn source_indices(graph: &Graph) -> Vec<Vec<u32>> {
     indices.collect()
 }
 
+/// Returns for each instance the index that each of its points had when it was read, of the indices for each geometry.
+pub(crate) fn sources_of<'s>(flat: &FlatScene, source_indices: &'s [Vec<u32>]) -> Vec<&'s [u32]> {
+    let source = |instance: &Instance| source_indices.get(instance.graph_geometry_idx as usize);
+    let sources = flat.instances.iter().map(source);
+    sources.map(|source| source.map_or(&[][..], Vec::as_slice)).collect()
+}
+
+/// Returns the corners of a box around all instances, in world coordinates: least and greatest.
+pub(crate) fn world_bounds(flat: &FlatScene) -> [[f64; 3]; 2] {
+    let boxes = flat.instances.iter().map(|instance| instance.bounds);
+    let all = boxes.fold(Aabb::EMPTY, Aabb::union);
+    [all.min, all.max].map(|corner| (flat.origin + corner.as_dvec3()).to_array())
+}
+
 impl BuiltScene {
     /// Sets the brightness of all lights: by the description, or from a preview of second 0.
     ///
@@ -127,12 +141,10 @@ impl BuiltScene {
     ///
     /// Fails if cancelled.
     pub fn choose_exposure(&mut self, progress: &dyn Progress) -> Result<()> {
+        let log = ProgressLog::new(progress);
         let exposure = self.description.light.exposure();
-        let stops = exposure_stops(exposure, &self.renderer, &self.flat, &self.settings, progress)?;
-        if exposure == Exposure::Auto {
-            let reason = format!("exposure {stops:+.2} stops");
-            self.choices.push(Choice { reason, keys: vec!["exposure".into()] });
-        }
+        let stops = exposure_stops(exposure, &self.renderer, &self.flat, &self.settings, &log)?;
+        self.choices.extend(log.into_choices());
         expose(&mut self.flat, stops);
         self.stops = stops;
         self.lights.clone_from(&self.flat.lights);
@@ -170,11 +182,14 @@ impl BuiltScene {
         self.renderer.gpu_name()
     }
 
-    /// Returns the index that a point of an instance had when it was read.
-    pub(crate) fn source_index(&self, instance: usize, point: u32) -> Option<u32> {
-        let instance = self.flat.instances.get(instance)?;
-        let sources = self.source_indices.get(instance.graph_geometry_idx as usize)?;
-        sources.get(point as usize).copied()
+    /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
+    pub(crate) fn sources(&self) -> Vec<&[u32]> {
+        sources_of(&self.flat, &self.source_indices)
+    }
+
+    /// Returns the corners of a box around everything, in world coordinates: least and greatest.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        world_bounds(&self.flat)
     }
 
     /// Moves everything to a time in seconds, forward or back.
@@ -234,11 +249,9 @@ impl BuiltScene {
     ///
     /// Fails if the settings make no picture, and if cancelled.
     pub fn render_with(&self, progress: &dyn Progress) -> Result<(RenderedImage, RenderStats)> {
-        let (mut image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
-        self.overlay.draw(&mut image, &self.flat.camera);
-        let mut options = image_options(&self.description, self.flat.origin);
-        options.georeference = self.georeference().filter(|_| self.description.plan.is_to_scale());
-        Ok((RenderedImage::new(image, options), stats))
+        let (image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
+        let scene = (&self.flat, &self.description);
+        Ok((RenderedImage::finish(image, &self.overlay, scene, self.georeference()), stats))
     }
 }
 
@@ -258,5 +271,35 @@ pub(crate) fn exposure_stops(
             progress.choice(&format!("exposure {stops:+.2} stops"), &["exposure"]);
             Ok(stops)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! The choices that a built scene lists.
+
+    use super::*;
+    use crate::memory_files::MemoryContent;
+    use crate::resolve;
+    use std::path::Path;
+    use std::sync::Arc;
+    use surfel_core::points::PointCloud;
+
+    #[test]
+    fn an_exposure_is_listed_only_where_one_was_chosen() {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let cloud = Arc::new(PointCloud::from_positions((0..400).map(corner).collect()));
+        let n_choices = |light: &str, exposure: &str| {
+            let mut description = SceneDescription::of_files(["memory:plane"]);
+            description.memory.insert("memory:plane", MemoryContent::Points(cloud.clone(), None));
+            for (key, value) in [("light", light), ("exposure", exposure)] {
+                description.set(key, &value.into(), Path::new("")).unwrap();
+            }
+            let scene = resolve(&description, &NoProgress).unwrap().build(&NoProgress).unwrap();
+            scene.choices().iter().filter(|choice| choice.keys == ["exposure"]).count()
+        };
+        assert_eq!(n_choices("sun", "auto"), 1);
+        assert_eq!(n_choices("none", "auto"), 0);
+        assert_eq!(n_choices("sun", "1"), 0);
     }
 }

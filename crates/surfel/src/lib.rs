@@ -8,7 +8,7 @@
 //!
 //! // Rays are [x, y, z, dx, dy, dz] in the coordinates of the file.
 //! let rays = [[562330.0, 4183200.0, 160.0, 0.0, 0.0, -1.0]];
-//! for hit in scene.cast_rays(&rays).into_iter().flatten() {
+//! for hit in scene.cast_rays(&rays)?.into_iter().flatten() {
 //!     println!("point {:?} at {:?}", hit.point, hit.position);
 //! }
 //! # Ok::<(), surfel::Error>(())
@@ -72,7 +72,6 @@ mod no_gpu;
 mod renderer;
 mod built_scene;
 pub mod ray_query;
-mod raycast;
 pub mod animate;
 pub mod prepare;
 mod scene_keys;
@@ -90,7 +89,7 @@ pub use description::SceneDescription;
 pub use error::{Error, Result};
 pub use picture::RenderedImage;
 pub use progress_log::Choice;
-pub use raycast::RayHit;
+pub use ray_query::RayHit;
 pub use renderer::SceneRenderer;
 pub use resolve::{Resolved, resolve};
 pub use thread_pools::RendererOnThreads;

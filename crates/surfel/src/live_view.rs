@@ -1,11 +1,12 @@
 //! A scene under one description, at one time: what is drawn, and what its pixels and rays lead back to.
 
+use crate::built_scene::{sources_of, world_bounds};
 use crate::crs::{Unit, georeference};
 use crate::description::SceneDescription;
+use crate::error::Result;
 use crate::overlay::Overlay;
-use crate::picture::{RenderedImage, image_options};
+use crate::picture::RenderedImage;
 use crate::ray_query::RayCaster;
-use crate::raycast::world_bounds;
 use crate::resolve::{LoadedScene, coordinate_system};
 use std::sync::Arc;
 use surfel_core::flat::{FlatScene, Instance};
@@ -70,11 +71,20 @@ impl LiveView {
     }
 
     /// Draws the overlay with another legend onto a picture of the view, which becomes a file as the description says.
-    pub fn finished_with(&self, mut image: Image, legend: Legend) -> RenderedImage {
-        self.overlay_with(legend).draw(&mut image, &self.flat.camera);
-        let mut options = image_options(&self.description, self.flat.origin);
-        options.georeference = self.georeference().filter(|_| self.description.plan.is_to_scale());
-        RenderedImage::new(image, options)
+    pub fn finished_with(&self, image: Image, legend: Legend) -> RenderedImage {
+        self.finished_by(image, &self.overlay_with(legend))
+    }
+
+    /// Draws the overlay of a movie onto a frame, whose legend keeps its corner.
+    pub(crate) fn finished_frame(&self, image: Image) -> RenderedImage {
+        let mut overlay = self.overlay();
+        overlay.is_fixed = true;
+        self.finished_by(image, &overlay)
+    }
+
+    fn finished_by(&self, image: Image, overlay: &Overlay) -> RenderedImage {
+        let scene = (&self.flat, &self.description);
+        RenderedImage::finish(image, overlay, scene, self.georeference())
     }
 
     /// Returns where the pixels of a picture lie, if the camera looks straight down without perspective.
@@ -98,15 +108,16 @@ impl LiveView {
     }
 
     /// Returns what casts rays at the view.
-    pub fn ray_caster(&self, simd: Simd) -> RayCaster<'_> {
-        RayCaster { scene: &self.flat, simd, sources: self.sources() }
+    ///
+    /// # Errors
+    ///
+    /// Fails for views of round points, which have no surface.
+    pub fn ray_caster(&self, simd: Simd) -> Result<RayCaster<'_>> {
+        RayCaster::new(&self.flat, simd, self.sources())
     }
 
     /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
     pub fn sources(&self) -> Vec<&[u32]> {
-        let sources = &self.trees.source_indices;
-        let source = |instance: &Instance| sources.get(instance.graph_geometry_idx as usize);
-        let sources = self.flat.instances.iter().map(source);
-        sources.map(|source| source.map_or(&[][..], Vec::as_slice)).collect()
+        sources_of(&self.flat, &self.trees.source_indices)
     }
 }

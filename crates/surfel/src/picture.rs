@@ -2,12 +2,14 @@
 
 use crate::description::SceneDescription;
 use crate::error::Result;
+use crate::overlay::Overlay;
 use std::ops::Deref;
 use std::path::Path;
+use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::math::DVec3;
 use surfel_core::scene::Background;
-use surfel_formats::{Alpha, ImageOptions};
+use surfel_formats::{Alpha, Georeference, ImageOptions};
 
 /// A rendered picture: linear colours and layers, and how they become a file.
 #[derive(Clone, Debug)]
@@ -17,8 +19,16 @@ pub struct RenderedImage {
 }
 
 impl RenderedImage {
-    /// A picture that is saved with these options.
-    pub(crate) fn new(image: Image, options: ImageOptions) -> Self {
+    /// Draws the overlay onto a picture of a scene, which becomes a file as the scene's description says.
+    pub(crate) fn finish(
+        mut image: Image,
+        overlay: &Overlay,
+        (flat, description): (&FlatScene, &SceneDescription),
+        georeference: Option<Georeference>,
+    ) -> Self {
+        overlay.draw(&mut image, &flat.camera);
+        let mut options = image_options(description, flat.origin);
+        options.georeference = georeference.filter(|_| description.plan.is_to_scale());
         Self { image, options }
     }
 

@@ -1,12 +1,18 @@
-//! Rays as columns against a flat scene, on all threads, after Open3D's `RaycastingScene`.
+//! Rays in world coordinates against a scene, on all threads, after Open3D's `RaycastingScene`.
 
+use crate::built_scene::BuiltScene;
+use crate::description::Invalid;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::image::NO_ID;
 use surfel_core::math::{DVec3, Ray, Vec3};
-use surfel_core::progress::Progress;
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::render::uses_rasterizer;
 use surfel_core::trace::{InstanceFilter, SceneHit, Simd, scene_hits, scene_occlusions};
+
+/// Part of a ray from its origin without end.
+pub const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
 
 /// Number of rays that a thread claims at a time.
 const CHUNK: usize = 4096;
@@ -52,10 +58,6 @@ impl WorldRays {
     pub fn is_empty(&self) -> bool {
         self.rays.is_empty()
     }
-
-    pub(crate) fn local(&self) -> &[Ray] {
-        &self.rays
-    }
 }
 
 /// The nearest surfaces on rays as columns, with an entry for each ray.
@@ -65,26 +67,70 @@ pub struct RayHits {
     pub t_hit: Vec<f32>,
     /// Index of the instance; `NO_ID` without a hit.
     pub instances: Vec<u32>,
-    /// Index of the triangle in its mesh, or of the nearest point in its cloud; `NO_ID` without a hit.
-    pub primitives: Vec<u32>,
-    /// Unit normal that faces the ray's origin; 0 without a hit.
-    pub normals: Vec<[f32; 3]>,
+    /// Index of the triangle in its mesh; `NO_ID` for points and without a hit.
+    pub triangles: Vec<u32>,
     /// Index that the nearest point had when it was read; `NO_ID` for triangles and without a hit.
     pub points: Vec<u32>,
+    /// Unit normal that faces the ray's origin; 0 without a hit.
+    pub normals: Vec<[f32; 3]>,
 }
 
-/// Casts rays at a flat scene.
+impl RayHits {
+    /// Returns the hit of one ray, of which these are the columns.
+    fn of_ray(&self, ray_idx: usize, [x, y, z, dx, dy, dz]: [f64; 6]) -> Option<RayHit> {
+        let t_hit = self.t_hit[ray_idx];
+        let some = |ids: &[u32]| Some(ids[ray_idx]).filter(|id| *id != NO_ID);
+        let position = DVec3::new(x, y, z) + f64::from(t_hit) * DVec3::new(dx, dy, dz);
+        Some(RayHit {
+            t_hit,
+            position: position.to_array(),
+            normal: self.normals[ray_idx],
+            instance: some(&self.instances)?,
+            point: some(&self.points),
+            triangle: some(&self.triangles),
+        })
+    }
+}
+
+/// The nearest surface on a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Distance from the ray's origin, in multiples of the length of its direction.
+    pub t_hit: f32,
+    /// World coordinates of the hit.
+    pub position: [f64; 3],
+    /// Unit normal that faces the ray's origin.
+    pub normal: [f32; 3],
+    /// Index of the instance that was hit.
+    pub instance: u32,
+    /// The point that is nearest to the hit, by its index among those that were read; none for triangles.
+    pub point: Option<u32>,
+    /// The triangle that was hit, by its index in its mesh; none for points.
+    pub triangle: Option<u32>,
+}
+
+/// Casts rays at a scene, which has surfaces: rays pass between round points.
 #[derive(Clone, Debug)]
 pub struct RayCaster<'s> {
-    /// The scene.
-    pub scene: &'s FlatScene,
-    /// SIMD level of the kernels.
-    pub simd: Simd,
+    scene: &'s FlatScene,
+    simd: Simd,
     /// For each instance, the index that each of its points had when it was read; empty where that is not known.
-    pub sources: Vec<&'s [u32]>,
+    sources: Vec<&'s [u32]>,
 }
 
-impl RayCaster<'_> {
+impl<'s> RayCaster<'s> {
+    /// Takes a scene, and for each instance the index that each of its points had when it was read.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes of round points, which have no surface.
+    pub fn new(scene: &'s FlatScene, simd: Simd, sources: Vec<&'s [u32]>) -> Result<Self> {
+        if uses_rasterizer(scene)? {
+            let advice = "points have no surface that rays meet; choose another, as `smooth`";
+            return Err(Invalid::at("surface", advice).into());
+        }
+        Ok(Self { scene, simd, sources })
+    }
     /// Finds the nearest surface on each ray.
     ///
     /// # Errors
@@ -96,43 +142,45 @@ impl RayCaster<'_> {
         let mut hits = RayHits {
             t_hit: vec![0.0; n],
             instances: vec![0; n],
-            primitives: vec![0; n],
-            normals: vec![[0.0; 3]; n],
+            triangles: vec![0; n],
             points: vec![0; n],
+            normals: vec![[0.0; 3]; n],
         };
         let columns = hits.t_hit.par_chunks_mut(CHUNK).zip(hits.instances.par_chunks_mut(CHUNK));
-        let columns = columns.zip(hits.primitives.par_chunks_mut(CHUNK));
-        let columns = columns.zip(hits.normals.par_chunks_mut(CHUNK));
+        let columns = columns.zip(hits.triangles.par_chunks_mut(CHUNK));
         let columns = columns.zip(hits.points.par_chunks_mut(CHUNK));
+        let columns = columns.zip(hits.normals.par_chunks_mut(CHUNK));
         let chunks = rays.rays.par_chunks(CHUNK).zip(rays.lengths.par_chunks(CHUNK));
         let buffer = || vec![SceneHit::MISS; CHUNK];
         columns.zip(chunks).try_for_each_init(buffer, |buffer, (columns, (rays, lengths))| {
             progress.check()?;
-            let ((((t_hit, instances), primitives), normals), points) = columns;
+            let ((((t_hit, instances), triangles), points), normals) = columns;
             let found = &mut buffer[..rays.len()];
             scene_hits(self.scene, self.simd, InstanceFilter::All, rays, found);
             t_hit.fill(f32::INFINITY);
-            for ids in [&mut *instances, &mut *primitives, &mut *points] {
+            for ids in [&mut *instances, &mut *triangles, &mut *points] {
                 ids.fill(NO_ID);
             }
             for (i, hit) in found.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
                 t_hit[i] = hit.distance / lengths[i];
                 instances[i] = hit.instance;
                 normals[i] = hit.normal.to_array();
-                (primitives[i], points[i]) = self.ids(hit);
+                match self.point(hit) {
+                    Some(point) => points[i] = point,
+                    None => triangles[i] = hit.id,
+                }
             }
             Ok::<(), Error>(())
         })?;
         Ok(hits)
     }
 
-    /// Returns the index of a hit's primitive, and that of its point if it is one.
-    fn ids(&self, hit: &SceneHit) -> (u32, u32) {
+    /// Returns the index that the point of a hit had when it was read; none for triangles.
+    fn point(&self, hit: &SceneHit) -> Option<u32> {
+        let instance = self.scene.instances.get(hit.instance as usize)?;
+        let FlatGeometry::Cloud(_) = self.scene.geometry(instance) else { return None };
         let source = || self.sources.get(hit.instance as usize)?.get(hit.id as usize).copied();
-        let id = source().unwrap_or(hit.id);
-        let is_point = |instance| matches!(self.scene.geometry(instance), FlatGeometry::Cloud(_));
-        let instance = self.scene.instances.get(hit.instance as usize);
-        (id, if instance.is_some_and(is_point) { id } else { NO_ID })
+        Some(source().unwrap_or(hit.id))
     }
 
     /// Finds out for each ray whether any surface lies on it.
@@ -190,6 +238,44 @@ impl RayCaster<'_> {
     }
 }
 
+impl BuiltScene {
+    /// Returns what casts rays at the scene, many at a time and with progress.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes of round points, which have no surface.
+    pub fn ray_caster(&self) -> Result<RayCaster<'_>> {
+        RayCaster::new(self.flat(), self.simd(), self.sources())
+    }
+
+    /// Finds the nearest surface on each ray. A ray is `[x, y, z, dx, dy, dz]`: origin and direction in world
+    /// coordinates; the direction has any length but 0.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes of round points, which have no surface.
+    pub fn cast_rays(&self, rays: &[[f64; 6]]) -> Result<Vec<Option<RayHit>>> {
+        let hits = self.ray_caster()?.hits(&self.world_rays(rays, WHOLE_RAY), &NoProgress)?;
+        let found = rays.iter().enumerate().map(|(i, ray)| hits.of_ray(i, *ray));
+        Ok(found.collect())
+    }
+
+    /// Returns whether any surface lies on each ray, within distances from `t_range.0` to `t_range.1` in multiples of
+    /// the length of its direction: `(0.0, 1.0)` is a line of sight that ends where the direction does, [`WHOLE_RAY`]
+    /// has no end.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes of round points, which have no surface.
+    pub fn test_occlusions(&self, rays: &[[f64; 6]], t_range: (f32, f32)) -> Result<Vec<bool>> {
+        self.ray_caster()?.occlusions(&self.world_rays(rays, t_range), &NoProgress)
+    }
+
+    fn world_rays(&self, rays: &[[f64; 6]], t_range: (f32, f32)) -> WorldRays {
+        WorldRays::new(rays.par_iter().copied(), t_range, self.flat())
+    }
+}
+
 /// Returns the rest of a ray behind a surface.
 fn behind(ray: &Ray, hit: &SceneHit) -> Ray {
     /// A ray along the surface would otherwise be moved without bound.
@@ -204,8 +290,13 @@ mod tests {
     //! Columns of rays against a square of triangles and against nothing.
 
     use super::*;
+    use crate::description::SceneDescription;
+    use crate::memory_files::MemoryContent;
+    use crate::resolve;
+    use std::path::Path;
+    use std::sync::Arc;
     use surfel_core::math::Vec2;
-    use surfel_core::progress::NoProgress;
+    use surfel_core::points::PointCloud;
     use surfel_core::scene::Background;
     use surfel_core::scene::{Camera, Geometry, Graph, Material, Mesh, Projection, Scene};
 
@@ -235,16 +326,16 @@ mod tests {
     #[test]
     fn rays_meet_both_squares() {
         let scene = two_squares();
-        let caster = RayCaster { scene: &scene, simd: Simd::detect(), sources: Vec::new() };
+        let caster = RayCaster::new(&scene, Simd::detect(), Vec::new()).unwrap();
         let down = |x: f64, length: f64| [5e5 + x, 4e6 + 0.25, 10.0, 0.0, 0.0, -length];
         let nan = [f64::NAN, 4e6, 10.0, 0.0, 0.0, -1.0];
         let rays = [down(0.5, 1.0), down(0.5, 2.0), down(5.0, 1.0), down(0.5, 0.0), nan];
-        let all = WorldRays::new(rays.par_iter().copied(), (0.0, f32::INFINITY), &scene);
+        let all = WorldRays::new(rays.par_iter().copied(), WHOLE_RAY, &scene);
         let hits = caster.hits(&all, &NoProgress).unwrap();
         let none = f32::INFINITY;
         assert_eq!(hits.t_hit, [7.0, 3.5, none, none, none]);
         assert_eq!(hits.instances, [0, 0, NO_ID, NO_ID, NO_ID]);
-        assert_eq!(hits.primitives, [2, 2, NO_ID, NO_ID, NO_ID]);
+        assert_eq!(hits.triangles, [2, 2, NO_ID, NO_ID, NO_ID]);
         assert_eq!(hits.points, [NO_ID; 5]);
         assert_eq!(hits.normals[..3], [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
         assert_eq!(caster.counts(&all, &NoProgress).unwrap(), [2, 2, 0, 0, 0]);
@@ -254,9 +345,45 @@ mod tests {
         assert_eq!(caster.occlusions(&short, &NoProgress).unwrap()[..2], [false, true]);
         // Neither length is one of f32.
         let lengths = [1e-60, 1e60].map(|length| down(0.5, length));
-        let odd = WorldRays::new(lengths.par_iter().copied(), (0.0, f32::INFINITY), &scene);
+        let odd = WorldRays::new(lengths.par_iter().copied(), WHOLE_RAY, &scene);
         assert_eq!(caster.hits(&odd, &NoProgress).unwrap().t_hit, [none, none]);
         let late = WorldRays::new(rays.par_iter().copied(), (8.0, 20.0), &scene);
         assert_eq!(caster.hits(&late, &NoProgress).unwrap().t_hit[0], 10.0);
+    }
+
+    /// Returns a plane of points on z = 0, the first of which is not finite.
+    fn plane(surface: &str) -> BuiltScene {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let mut cloud = PointCloud::from_positions((0..400).map(corner).collect());
+        cloud.positions[0] = Vec3::NAN;
+        let mut description = SceneDescription::of_files(["memory:plane"]);
+        description.memory.insert("memory:plane", MemoryContent::Points(Arc::new(cloud), None));
+        description.set("surface", &surface.into(), Path::new("")).unwrap();
+        resolve(&description, &NoProgress).unwrap().build_trees(&NoProgress).unwrap()
+    }
+
+    #[test]
+    fn a_built_scene_answers_as_its_ray_caster_does() {
+        let scene = plane("sphere");
+        let rays = [[3.0, 4.0, 6.0, 0.0, 0.0, -2.0], [50.0, 4.0, 6.0, 0.0, 0.0, -2.0]];
+        let hits = scene.cast_rays(&rays).unwrap();
+        let hit = hits[0].unwrap();
+        assert_eq!(hit.position, [3.0, 4.0, 6.0 - 2.0 * f64::from(hit.t_hit)]);
+        // The 84th point of the file, though the first one is gone.
+        assert_eq!((hit.point, hit.triangle, hits[1]), (Some(83), None, None));
+        let caster = scene.ray_caster().unwrap();
+        let columns = caster.hits(&scene.world_rays(&rays, WHOLE_RAY), &NoProgress).unwrap();
+        assert_eq!((columns.points, columns.triangles), (vec![83, NO_ID], vec![NO_ID; 2]));
+        let occluded = |t_range| scene.test_occlusions(&rays, t_range).unwrap();
+        assert_eq!(occluded(WHOLE_RAY), [true, false]);
+        assert_eq!(occluded((0.0, 1.0)), [false, false]);
+    }
+
+    #[test]
+    fn rays_are_refused_where_nothing_is_a_surface() {
+        let scene = plane("points");
+        let error = scene.cast_rays(&[[3.0, 4.0, 6.0, 0.0, 0.0, -1.0]]).unwrap_err().to_string();
+        assert!(error.starts_with("surface: points have no surface"), "{error}");
+        assert!(scene.test_occlusions(&[], WHOLE_RAY).is_err());
     }
 }

@@ -29,7 +29,6 @@ use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
-use surfel::picture::image_options;
 use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
@@ -342,10 +341,7 @@ impl SceneProvider for FileSceneProvider {
             return Err(rejection(fault));
         }
         let image = self.scene.render(&view, progress).map_err(rejection);
-        let mut image = self.folders.removed(image)?;
-        view.overlay().draw(&mut image, &view.flat.camera);
-        let options = image_options(&description, view.flat.origin);
-        surfel_formats::encode_png(&image, &options).map_err(rejection)
+        view.finished(self.folders.removed(image)?).png_bytes().map_err(rejection)
     }
 
     fn drawable_settings(&self, settings: &SettingsMap) -> SettingsMap {
