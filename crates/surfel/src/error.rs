@@ -1,6 +1,7 @@
 //! Errors between a description and a picture.
 
 use crate::description::{Invalid, with_nearest};
+use crate::names::list_files;
 use std::path::PathBuf;
 
 /// An error of this crate. Its message names the file, the place in it, what was found and what was expected.
@@ -18,7 +19,7 @@ pub enum Error {
     File(surfel_formats::Error),
     /// The renderer refused what these files hold.
     // Not named `source`: programs that print the chain of sources would print it twice.
-    #[error("{}: {cause}", crate::names::list_files(files))]
+    #[error("{}: {cause}", list_files(files))]
     Content {
         /// The files.
         files: Vec<PathBuf>,
@@ -28,6 +29,19 @@ pub enum Error {
     /// The data lack something that the description asks for.
     #[error("{0}")]
     Unfit(String),
+    /// A filter keeps no point.
+    #[error("{}no point meets {filter}", prefix(files))]
+    NoPointKept {
+        /// Files of the points; none if they are not told apart.
+        files: Vec<PathBuf>,
+        /// Key of the setting that is the filter; none if it is of several settings.
+        key: Option<&'static str>,
+        /// The filter, as a description has it.
+        filter: String,
+    },
+    /// The system denies threads.
+    #[error("the threads cannot be started; ask for fewer with `threads`: {0}")]
+    Threads(String),
     /// A movie was not finished.
     #[error("{cause}; {} kept, continue from there with --resume", frames(*n_done, *n_frames))]
     Unfinished {
@@ -70,6 +84,14 @@ impl From<surfel_formats::Error> for Error {
 
 /// A result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Returns the start of a message about files.
+fn prefix(files: &[PathBuf]) -> String {
+    match files {
+        [] => String::new(),
+        files => format!("{}: ", list_files(files)),
+    }
+}
 
 /// Returns how many frames of a movie are done, with the verb.
 fn frames(n_done: u32, n_frames: u32) -> String {

@@ -4,11 +4,12 @@ use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
 use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
-    MemoryEstimate, check_empty, keep_matching, report_denoise, report_normals, report_radii,
+    MemoryEstimate, check_empty, filter_cloud, report_denoise, report_normals, report_radii,
     report_unused_of_files,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use surfel_core::math::DAffine3;
 use surfel_core::points::{
     Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, STRUCTURE,
     StructureChoice, denoise, prepare, select_points,
@@ -77,12 +78,7 @@ pub fn prepare_points(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let settings = &description.objects_default.preparation;
-    for (key, filter) in settings.point_filters()? {
-        keep_matching(&mut loaded.cloud, key, &filter, progress)?;
-        if loaded.cloud.is_empty() {
-            return Err(Error::Unfit(format!("no point meets {filter}")));
-        }
-    }
+    loaded.cloud = filter_cloud(loaded.cloud, &DAffine3::IDENTITY, settings, progress)?;
     if settings.reproject == Some(true) {
         move_to_metres(&mut loaded.cloud, &mut loaded.info, None, progress);
     }
@@ -335,6 +331,28 @@ mod tests {
             scalars: vec![index(ROW_INDEX, 0), index(COLUMN_INDEX, 1)],
             stations: vec![ScanStation { position: Some(DVec3::ZERO), ..ScanStation::default() }],
             ..PointCloud::from_positions(cells().map(position).collect())
+        }
+    }
+
+    #[test]
+    fn filters_that_keep_nothing_are_one_error_wherever_the_points_come_from() {
+        let file = std::env::temp_dir().join(format!("surfel-none-{}.ply", std::process::id()));
+        surfel_formats::save(&file, &two_walls(), &SaveOptions::default(), &NoProgress).unwrap();
+        let mut description = SceneDescription::default();
+        let filter = &mut description.objects_default.preparation.filter;
+        *filter = Some("x > 50".parse().unwrap());
+        let (loaded, options) =
+            (Loaded { cloud: two_walls(), info: FileInfo::default() }, PrepareOptions::default());
+        let of_points = prepare_points(loaded, &description, options, &NoProgress);
+        let files = std::slice::from_ref(&file);
+        let of_file = prepare_files(files, &description, options, &NoProgress);
+        description.files.push(file.clone());
+        let of_scene = crate::resolve(&description, &NoProgress);
+        std::fs::remove_file(&file).unwrap();
+        let errors = [of_points.unwrap_err(), of_file.unwrap_err(), of_scene.unwrap_err()];
+        for (error, n_files) in errors.iter().zip([0, 1, 1]) {
+            let Error::NoPointKept { files, key, filter } = error else { panic!("{error}") };
+            assert_eq!((files.len(), *key, &filter[..]), (n_files, Some("filter"), "x > 50"));
         }
     }
 

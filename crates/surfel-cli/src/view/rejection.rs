@@ -10,6 +10,10 @@ pub fn rejection(error: impl Into<surfel::Error>) -> Error {
             let text = error.reason();
             Error::InvalidRequest { key: Some(error.path).filter(|path| !path.is_empty()), text }
         }
+        surfel::Error::NoPointKept { key, filter, .. } => {
+            let text = format!("no point meets {filter}");
+            Error::InvalidRequest { key: key.map(str::to_owned), text }
+        }
         error => Error::invalid_request(error.to_string().replace('\n', " ")),
     }
 }

@@ -1,6 +1,7 @@
 //! Work on pictures beside other work.
 
 use super::*;
+use crate::Error;
 use crate::description::ObjectDescription;
 use crate::memory_files::{FileContent, MemoryContent};
 use crate::resolve::resolve;
@@ -153,8 +154,9 @@ fn choices_are_those_of_a_picture_of_the_same_points() {
         assert!(sources.iter().all(|source| (400 <= *source) == is_floor), "{filter}");
     }
     description.objects_default.preparation.filter = Some("z > 1e6".parse().unwrap());
-    let error = scene.view(&description, &NoProgress).unwrap_err().to_string();
-    assert!(error.contains("none of 1300 points meets"), "{error}");
+    let error = scene.view(&description, &NoProgress).unwrap_err();
+    assert!(matches!(error, Error::NoPointKept { key: Some("filter"), .. }), "{error}");
+    assert_eq!(error.to_string(), "no point meets z > 1000000");
     std::fs::remove_file(path).unwrap();
 }
 

@@ -4,7 +4,6 @@ use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings, with_nearest};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
-use crate::names::list_files;
 use crate::progress_log::NotesAsChoices;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -156,18 +155,15 @@ pub fn into_cloud(
 ///
 /// # Errors
 ///
-/// Fails, with the key at fault, if the cloud lacks a column of a filter, and if a filter keeps no point.
+/// Fails if the cloud lacks a column of a filter, and if a filter keeps no point.
 pub fn filter_cloud(
     mut cloud: PointCloud,
     file_from_cloud: &DAffine3,
     settings: &PreparationSettings,
     progress: &dyn Progress,
-) -> Result<PointCloud, Invalid> {
-    for (key, filter) in settings.point_filters()? {
-        let n_points = cloud.len();
-        let kept = matches(&in_file(&cloud, file_from_cloud), key, &filter)?;
-        keep(&mut cloud, &kept, &filter, progress);
-        check_any_left(cloud.len(), n_points, key, &filter)?;
+) -> Result<PointCloud> {
+    if let Some(kept) = kept_points(&cloud, file_from_cloud, settings, progress)? {
+        cloud.retain_from(0, &kept);
     }
     Ok(cloud)
 }
@@ -183,37 +179,44 @@ pub fn filtered_copy(
     file_from_cloud: &DAffine3,
     settings: &PreparationSettings,
     progress: &dyn Progress,
-) -> Result<PointCloud, Invalid> {
-    let mut kept: Vec<u32> = (0..cloud.len() as u32).collect();
-    let filters = settings.point_filters()?;
-    if filters.is_empty() {
+) -> Result<PointCloud> {
+    let Some(kept) = kept_points(cloud, file_from_cloud, settings, progress)? else {
         return Ok(cloud.clone());
-    }
-    let in_file = in_file(cloud, file_from_cloud);
-    for (key, filter) in filters {
-        let n_points = kept.len();
-        let matches = matches(&in_file, key, &filter)?;
-        kept.retain(|i| matches[*i as usize]);
-        let points = counted(n_points, "point");
-        progress.note(&format!("{} of {points} meet {}", kept.len(), filter.describe()));
-        check_any_left(kept.len(), n_points, key, &filter)?;
-    }
-    Ok(cloud.subset(&kept))
+    };
+    let indices: Vec<u32> =
+        (0..).zip(kept).filter_map(|(i, is_kept)| is_kept.then_some(i)).collect();
+    Ok(cloud.subset(&indices))
 }
 
-/// Fails if a filter kept none of the points.
-fn check_any_left(
-    n_left: usize,
-    n_points: usize,
-    key: &str,
-    filter: &PointFilter,
-) -> Result<(), Invalid> {
-    match n_left {
-        0 => {
-            Err(Invalid::at(key, format!("none of {} meets {filter}", counted(n_points, "point"))))
-        }
-        _ => Ok(()),
+/// Returns for each point whether the settings keep it, and reports how many they keep; `None` if they have no filter.
+fn kept_points(
+    cloud: &PointCloud,
+    file_from_cloud: &DAffine3,
+    settings: &PreparationSettings,
+    progress: &dyn Progress,
+) -> Result<Option<Vec<bool>>> {
+    let filters = settings.point_filters()?;
+    if filters.is_empty() {
+        return Ok(None);
     }
+    let cloud = in_file(cloud, file_from_cloud);
+    let (mut kept, mut n_kept) = (vec![true; cloud.len()], cloud.len());
+    for (key, filter) in filters {
+        let matches = filter.matches(&cloud, 0);
+        let matches = matches.map_err(|error| Invalid::at(key, with_nearest(&error)))?;
+        kept.iter_mut().zip(matches).for_each(|(is_kept, matches)| *is_kept &= matches);
+        let points = counted(n_kept, "point");
+        n_kept = kept.iter().filter(|is_kept| **is_kept).count();
+        progress.note(&format!("{n_kept} of {points} meet {}", filter.describe()));
+        if n_kept == 0 {
+            return Err(no_point_kept(&[], Some(key), &filter));
+        }
+    }
+    Ok(Some(kept))
+}
+
+fn no_point_kept(files: &[PathBuf], key: Option<&'static str>, filter: &PointFilter) -> Error {
+    Error::NoPointKept { files: files.to_vec(), key, filter: filter.to_string() }
 }
 
 /// Returns a cloud in the coordinates of its file: those of a node may be others.
@@ -231,30 +234,6 @@ fn in_file<'c>(cloud: &'c PointCloud, file_from_cloud: &DAffine3) -> Cow<'c, Poi
     Cow::Owned(moved)
 }
 
-fn matches(cloud: &PointCloud, key: &str, filter: &PointFilter) -> Result<Vec<bool>, Invalid> {
-    filter.matches(cloud, 0).map_err(|error| Invalid::at(key, with_nearest(&error)))
-}
-
-/// Drops the points of a cloud that do not meet the filter of a key.
-pub(crate) fn keep_matching(
-    cloud: &mut PointCloud,
-    key: &str,
-    filter: &PointFilter,
-    progress: &dyn Progress,
-) -> Result<(), Invalid> {
-    let kept = matches(cloud, key, filter)?;
-    keep(cloud, &kept, filter, progress);
-    Ok(())
-}
-
-/// Drops the points for which `kept` is false, and reports how many stay.
-fn keep(cloud: &mut PointCloud, kept: &[bool], filter: &PointFilter, progress: &dyn Progress) {
-    let n_points = cloud.len();
-    cloud.retain_from(0, kept);
-    let points = counted(n_points, "point");
-    progress.note(&format!("{} of {points} meet {}", cloud.len(), filter.describe()));
-}
-
 /// Reports the filter of settings with which files gave no point.
 ///
 /// # Errors
@@ -262,7 +241,9 @@ fn keep(cloud: &mut PointCloud, kept: &[bool], filter: &PointFilter, progress: &
 /// Fails if there is a filter.
 pub fn check_empty(files: &[PathBuf], settings: &PreparationSettings) -> Result<()> {
     let Some(filter) = settings.point_filter()? else { return Ok(()) };
-    Err(Error::Unfit(format!("{}: no point meets {filter}", list_files(files))))
+    let keys: Vec<&str> = settings.point_filters()?.into_iter().map(|(key, _)| key).collect();
+    let key = if let [key] = keys[..] { Some(key) } else { None };
+    Err(no_point_kept(files, key, &filter))
 }
 
 /// Returns true if a cloud has the values of a colour source, or gets them when it is prepared.

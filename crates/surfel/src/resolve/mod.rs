@@ -27,7 +27,7 @@ pub use camera::{
     SceneCamera, camera_motion, choose_camera, choose_up, short_position, up_convention,
 };
 pub use check_files::check_files;
-pub(crate) use cloud::keep_matching;
+pub(crate) use cloud::filter_cloud;
 pub use cloud::{
     can_be_colored, check_empty, prepare_cloud, report_denoise, report_normals, report_prepared,
     report_radii, state_known_sides,

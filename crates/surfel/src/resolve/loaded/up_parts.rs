@@ -51,16 +51,16 @@ mod tests {
     fn orbit_and_lamp(up: Vec3) -> [DVec3; 2] {
         let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, (i % 3) as f32);
         let cloud = PointCloud::from_positions((0..400).map(corner).collect());
-        let mut description = SceneDescription::default();
-        description.memory.insert("memory:moon", MemoryContent::Points(Arc::new(cloud), None));
-        let table = json!({ "file": "memory:moon", "name": "moon", "translate": [1, 0, 0] });
-        description.add_object(table.as_object().unwrap(), Path::new("")).unwrap();
-        let table = json!({ "animation": [{
-            "object": "moon", "kind": "orbit", "seconds": 1, "turns": 0.25, "center": [0, 0, 0],
-        }], "lamp": [{ "kind": "directional" }] });
-        let further =
+        let table = json!({
+            "object": [{ "file": "memory:moon", "name": "moon", "translate": [1, 0, 0] }],
+            "animation": [{
+                "object": "moon", "kind": "orbit", "seconds": 1, "turns": 0.25, "center": [0, 0, 0],
+            }],
+            "lamp": [{ "kind": "directional" }],
+        });
+        let mut description =
             SceneDescription::from_table(table.as_object().unwrap(), Path::new("")).unwrap();
-        (description.animations, description.lamps) = (further.animations, further.lamps);
+        description.memory.insert("memory:moon", MemoryContent::Points(Arc::new(cloud), None));
         description.world.up = Some(up);
         let mut graph = resolve(&description, &NoProgress).unwrap().scene.graph;
         graph.evaluate_at(1.0);
