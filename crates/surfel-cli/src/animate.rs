@@ -1,7 +1,7 @@
 //! `surfel animate`: a movie of an animated scene, frame by frame, or of a turn around anything.
 
 use crate::cluster;
-use crate::global::{Global, check_device, start_threads};
+use crate::global::{Global, check_device};
 use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::output::check_replaces_nothing;
 use crate::render::{report_threads, with_info};
@@ -9,12 +9,11 @@ use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use crate::usage::Usage;
 use std::path::{Path, PathBuf};
-use surfel::SceneDescription;
-use surfel::animate::{PlannedMovie, movie_options};
+use surfel::animate::{PlannedMovie, check_movie};
+use surfel::{SceneDescription, start_global_threads};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
 use surfel_core::words::counted;
-use surfel_formats::MovieOptions;
 
 /// Arguments of `surfel animate`.
 #[derive(clap::Args, Debug)]
@@ -57,7 +56,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }
-    start_threads(&description.run)?;
+    start_global_threads(&description.run)?;
     check_device(&description.run)?;
     if description.output.output.is_none() && !args.dry_run {
         return Err(Usage("name the movie with -o, as in -o movie.mp4".into()).into());
@@ -84,7 +83,7 @@ pub fn animate_description(
     report: &Report,
 ) -> anyhow::Result<()> {
     let output = description.output.output.as_deref();
-    output.map_or(Ok(()), |output| check(output, &movie_options(description)))?;
+    output.map_or(Ok(()), |output| check(output, description))?;
     let movie = plan(description, report)?;
     let (Some(output), false) = (output, is_dry_run) else {
         movie.loaded.check_surfaces(description, 0.0)?;
@@ -111,7 +110,7 @@ fn animate_on_cluster(
     (address, resumes): (&str, bool),
     report: &Report,
 ) -> anyhow::Result<()> {
-    check(output, &movie_options(description))?;
+    check(output, description)?;
     let movie = plan(description, report)?;
     let mut recipe = description.clone();
     // The workers render frames of a movie whose length the data of this machine decide.
@@ -133,9 +132,11 @@ fn plan(description: &SceneDescription, report: &Report) -> anyhow::Result<Plann
     })
 }
 
-fn check(output: &Path, options: &MovieOptions) -> anyhow::Result<()> {
-    surfel_formats::check_movie(output, options).map_err(|error| match error {
-        surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
+fn check(output: &Path, description: &SceneDescription) -> anyhow::Result<()> {
+    check_movie(output, description).map_err(|error| match error {
+        surfel::Error::File(surfel_formats::Error::Unsupported { .. }) => {
+            Usage(error.to_string()).into()
+        }
         other => anyhow::Error::from(other),
     })
 }

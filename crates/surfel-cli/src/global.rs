@@ -2,10 +2,9 @@
 
 use crate::options::{EVERYWHERE, KeyOptions, Scope};
 use crate::report::Verbosity;
-use anyhow::Context;
 use clap::Args;
-use surfel::SceneRenderer;
 use surfel::description::{Backend, RunSettings};
+use surfel::{SceneRenderer, start_global_threads};
 
 /// Options of all commands.
 #[derive(Args, Clone, Debug)]
@@ -41,7 +40,7 @@ impl Global {
     /// Starts the threads that the options ask for; returns the settings.
     pub fn start(&self) -> anyhow::Result<RunSettings> {
         let settings = self.run.description.clone()?.run;
-        start_threads(&settings)?;
+        start_global_threads(&settings)?;
         Ok(settings)
     }
 }
@@ -52,12 +51,4 @@ pub fn check_device(settings: &RunSettings) -> anyhow::Result<()> {
         SceneRenderer::new(settings)?;
     }
     Ok(())
-}
-
-/// Starts the threads of all work to come.
-pub fn start_threads(settings: &RunSettings) -> anyhow::Result<()> {
-    let pool = rayon::ThreadPoolBuilder::new();
-    pool.num_threads(settings.threads.unwrap_or(0) as usize)
-        .build_global()
-        .context("the threads cannot be started; ask for fewer with --threads")
 }

@@ -1,6 +1,6 @@
 //! `surfel render`: from files to a picture.
 
-use crate::global::{Global, check_device, start_threads};
+use crate::global::{Global, check_device};
 use crate::options::{EVERYWHERE, Scope};
 use crate::output::{check_height_map, check_picture, check_replaces_nothing, check_stats};
 use crate::report::{Report, print};
@@ -10,9 +10,9 @@ use crate::usage::Usage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use surfel::SceneDescription;
 use surfel::description::Backend;
 use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
+use surfel::{SceneDescription, start_global_threads};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
 use surfel_core::words::counted;
@@ -64,7 +64,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }
-    start_threads(&description.run)?;
+    start_global_threads(&description.run)?;
     check_device(&description.run)?;
     if args.dry_run {
         return print_dry_run(&description, report);

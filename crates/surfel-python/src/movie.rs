@@ -3,7 +3,7 @@
 use crate::errors::{invalid_setting, to_exception};
 use crate::image::{PixelIds, PyImage};
 use crate::scene::PyScene;
-use crate::threads::{on_threads, start_threads};
+use crate::threads::{on_threads, own_threads};
 use crate::value::with_keys;
 use crate::work;
 use pyo3::exceptions::PyIndexError;
@@ -12,12 +12,12 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use surfel::animate::{PlannedMovie, movie_options, render_frame};
+use surfel::RenderedImage;
+use surfel::animate::{BuiltMovie, PlannedMovie, check_movie};
 use surfel::description::Invalid;
-use surfel::{BuiltScene, RenderedImage};
+use surfel::locks::lock_unless_cancelled;
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
-use surfel_formats::MovieOptions;
 
 /// Renders a movie of a scene: what moves in it, or a turn (`turntable=SECONDS`).
 ///
@@ -43,10 +43,9 @@ pub fn animate(
         description.output.frames = Some(n_frames(frames)?);
     }
     description.output.output = Some(output.clone());
-    surfel_formats::check_movie(&output, &movie_options(&description))
-        .map_err(|error| to_exception(py, &error.into()))?;
+    check_movie(&output, &description).map_err(|error| to_exception(py, &error))?;
     work::run(py, progress, |progress| {
-        let threads = start_threads(&description.run)?;
+        let threads = own_threads(&description.run)?;
         on_threads(threads.as_ref(), || {
             PlannedMovie::new(&description, progress)?.render(&output, resume, progress)
         })
@@ -58,8 +57,8 @@ pub fn animate(
 /// Raises `InvalidSetting` if nothing moves and neither `frames` nor `turntable` is given.
 #[pyclass(frozen, module = "surfel", name = "Film")]
 pub struct PyFilm {
-    scene: Mutex<BuiltScene>,
-    options: MovieOptions,
+    movie: Mutex<BuiltMovie>,
+    n_frames: u32,
     /// About how many bytes the scene takes.
     memory_estimate: u64,
     threads: Option<ThreadPool>,
@@ -77,18 +76,19 @@ impl PyFilm {
     ) -> PyResult<Self> {
         let description = with_keys(py, &scene.get().description(), keys)?;
         work::run(py, progress, |progress| {
-            let threads = start_threads(&description.run)?;
+            let threads = own_threads(&description.run)?;
             let planned =
                 on_threads(threads.as_ref(), || PlannedMovie::new(&description, progress))?;
             let memory_estimate = planned.memory_estimate();
-            let (scene, options) = on_threads(threads.as_ref(), || planned.build(progress))?;
-            Ok(Self { scene: Mutex::new(scene), options, memory_estimate, threads })
+            let movie = on_threads(threads.as_ref(), || planned.build(progress))?;
+            let n_frames = movie.n_frames();
+            Ok(Self { movie: Mutex::new(movie), n_frames, memory_estimate, threads })
         })
     }
 
     /// The number of frames.
     fn __len__(&self) -> usize {
-        self.options.n_frames as usize
+        self.n_frames as usize
     }
 
     /// Returns about how many bytes the film takes.
@@ -124,19 +124,19 @@ impl PyFilm {
 
 impl PyFilm {
     fn check(&self, index: u32) -> PyResult<()> {
-        if index < self.options.n_frames {
+        if index < self.n_frames {
             return Ok(());
         }
-        let message = format!("frame {index} of {}", self.options.n_frames);
+        let message = format!("frame {index} of {}", self.n_frames);
         Err(PyIndexError::new_err(message))
     }
 
     /// Renders a frame; returns it with the origin of its positions.
     fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<(RenderedImage, DVec3)> {
-        let mut scene = work::locked(&self.scene, progress)?;
-        let (scene, time_secs) = (&mut *scene, f64::from(index) / self.options.fps);
-        let image = on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
-        Ok((image, scene.flat().origin))
+        let mut movie = lock_unless_cancelled(&self.movie, progress)?;
+        let movie = &mut *movie;
+        let image = on_threads(self.threads.as_ref(), || movie.render_frame(index, progress))?;
+        Ok((image, movie.origin()))
     }
 }
 

@@ -1,10 +1,10 @@
 //! Scenes whose files are read, and their views.
 
-use crate::work::locked;
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
+use surfel::locks::lock_unless_cancelled;
 use surfel::progress_log::{Choice, ProgressLog};
 use surfel::resolve::check_files;
 use surfel_core::progress::Progress;
@@ -67,7 +67,7 @@ impl OpenScene {
         work: impl FnOnce(&LiveScene) -> surfel::Result<T> + Send,
     ) -> surfel::Result<T> {
         let has_threads = self.scene.startup().run.threads.is_some();
-        let _turn = has_threads.then(|| locked(&self.turn, progress)).transpose()?;
+        let _turn = has_threads.then(|| lock_unless_cancelled(&self.turn, progress)).transpose()?;
         self.scene.install(|| work(&self.scene))
     }
 }
@@ -78,7 +78,7 @@ pub fn opened(
     description: &SceneDescription,
     progress: &dyn Progress,
 ) -> surfel::Result<Arc<OpenScene>> {
-    let mut slot = locked(slot, progress)?;
+    let mut slot = lock_unless_cancelled(slot, progress)?;
     if let Some(scene) = &*slot {
         return Ok(scene.clone());
     }

@@ -2,7 +2,7 @@
 
 use crate::cloud::{PyCloud, to_cloud};
 use crate::errors::invalid_setting;
-use crate::threads::{on_threads, start_threads};
+use crate::threads::{on_threads, own_threads};
 use crate::value::with_keys;
 use crate::work;
 use pyo3::exceptions::PyUserWarning;
@@ -43,7 +43,7 @@ pub fn prepare(
     let options = PrepareOptions { normals, keep_variation };
     let sources = sources.iter().map(Source::new).collect::<PyResult<Vec<_>>>()?;
     let (prepared, choices) = work::run(py, progress, |progress| {
-        let threads = start_threads(&description.run)?;
+        let threads = own_threads(&description.run)?;
         let log = ProgressLog::new(progress);
         let prepared = on_threads(threads.as_ref(), || match files(&sources) {
             Some(files) => prepare_files(&files, &description, options, &log),

@@ -8,16 +8,13 @@ use pyo3::types::PyBool;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 use surfel_core::progress::Progress;
 
 /// Time between two looks for Ctrl-C, and between two reports of progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
-
-/// Time between two looks at what another thread has locked.
-const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Bytes of the stack of the thread that works, as many as a program's main thread has.
 const STACK_BYTES: usize = 8 << 20;
@@ -93,27 +90,6 @@ fn run_reporting<T: Send>(
 pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     check_process()?;
     Ok(py.detach(work))
-}
-
-/// Waits for what another thread has locked.
-///
-/// # Errors
-///
-/// Fails if cancelled.
-pub fn locked<'a, T>(
-    mutex: &'a Mutex<T>,
-    progress: &dyn Progress,
-) -> surfel::Result<MutexGuard<'a, T>> {
-    loop {
-        match mutex.try_lock() {
-            Ok(guard) => return Ok(guard),
-            Err(TryLockError::Poisoned(error)) => return Ok(error.into_inner()),
-            Err(TryLockError::WouldBlock) => {
-                progress.check()?;
-                thread::sleep(LOCK_POLL_INTERVAL);
-            }
-        }
-    }
 }
 
 /// Fails in a process that was forked after the threads of surfel were started: they do not exist there, and waiting

@@ -4,8 +4,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints what it does")]
 
 use std::path::Path;
-use surfel::animate::{animate, frame_count, movie_options};
-use surfel::{SceneDescription, resolve};
+use surfel::SceneDescription;
+use surfel::animate::PlannedMovie;
 use surfel_core::progress::NoProgress;
 
 fn main() -> surfel::Result<()> {
@@ -19,8 +19,5 @@ fn main() -> surfel::Result<()> {
     description.output.fps = Some(10.0);
     description.picture.resolution = Some((480, 270));
 
-    let mut scene = resolve(&description, &NoProgress)?.build(&NoProgress)?;
-    let mut options = movie_options(&description);
-    options.n_frames = frame_count(&description, 0.0)?;
-    animate(&mut scene, Path::new(&output), &options, false, &NoProgress)
+    PlannedMovie::new(&description, &NoProgress)?.render(Path::new(&output), false, &NoProgress)
 }

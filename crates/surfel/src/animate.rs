@@ -20,7 +20,10 @@ use surfel_formats::{Movie, MovieOptions};
 /// # Errors
 ///
 /// Fails if nothing moves and no number is given.
-pub fn frame_count(description: &SceneDescription, animated_secs: f64) -> Result<u32, Invalid> {
+pub(crate) fn frame_count(
+    description: &SceneDescription,
+    animated_secs: f64,
+) -> Result<u32, Invalid> {
     let output = &description.output;
     if let Some(frames) = output.frames {
         return Ok(frames);
@@ -34,7 +37,7 @@ pub fn frame_count(description: &SceneDescription, animated_secs: f64) -> Result
 }
 
 /// Returns how a description's movie becomes a file; the number of frames and the fingerprint follow later.
-pub fn movie_options(description: &SceneDescription) -> MovieOptions {
+pub(crate) fn movie_options(description: &SceneDescription) -> MovieOptions {
     let (width, height) = description.picture.resolution();
     MovieOptions {
         width,
@@ -46,9 +49,19 @@ pub fn movie_options(description: &SceneDescription) -> MovieOptions {
     }
 }
 
+/// Checks that the movie of a description can be written to a file, before any other file is read.
+///
+/// # Errors
+///
+/// Fails if the format is unknown or has no such frames, if the folder does not exist, and for video if ffmpeg is missing
+/// or refuses such frames.
+pub fn check_movie(output: &Path, description: &SceneDescription) -> Result<()> {
+    Ok(surfel_formats::check_movie(output, &movie_options(description))?)
+}
+
 /// Returns a text that changes with everything that frames depend on: the complete description, the sizes and times of
 /// all files, and the clouds and meshes in memory. Threads, memory limit, output file and saved views change no frame.
-pub fn fingerprint(
+fn fingerprint(
     complete: &SceneDescription,
     description: &SceneDescription,
     loaded: &LoadedScene,
@@ -122,8 +135,9 @@ impl PlannedMovie {
     ///
     /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
     pub fn render(self, output: &Path, resumes: bool, progress: &dyn Progress) -> Result<()> {
-        let (mut scene, options) = self.build(progress)?;
-        animate(&mut scene, output, &options, resumes, progress)
+        let BuiltMovie { mut scene, options } = self.build(progress)?;
+        let frame = |time_secs: f64| frame_at(&mut scene, time_secs, progress);
+        write_movie(output, &options, resumes, progress, frame)
     }
 
     /// Completes the movie with frames that are rendered elsewhere: `render` gets the indices of those that are missing
@@ -161,38 +175,65 @@ impl PlannedMovie {
         MovieOptions { fingerprint, ..self.options.clone() }
     }
 
-    /// Builds the trees of the scene, whose frames [`render_frame`] renders.
+    /// Builds the trees of the scene, whose frames are rendered one by one.
     ///
     /// # Errors
     ///
     /// Fails for scenes that no picture can be made of, and if cancelled.
-    pub fn build(self, progress: &dyn Progress) -> Result<(BuiltScene, MovieOptions)> {
+    pub fn build(self, progress: &dyn Progress) -> Result<BuiltMovie> {
         let mut options = self.options();
         let Self { loaded, description, auto, .. } = self;
-        let mut scene = loaded.into_resolved(auto, progress)?.build_trees(progress)?;
-        scene.choose_exposure(progress)?;
+        let scene = loaded.into_resolved(auto, progress)?.build(progress)?;
         options.image = image_options(&description, scene.flat().origin);
-        Ok((scene, options))
+        Ok(BuiltMovie { scene, options })
     }
 }
 
-/// Renders the frames that a movie lacks, and finishes it.
+/// A movie with the trees of its scene.
+#[derive(Debug)]
+pub struct BuiltMovie {
+    scene: BuiltScene,
+    options: MovieOptions,
+}
+
+impl BuiltMovie {
+    /// Returns the number of frames.
+    pub fn n_frames(&self) -> u32 {
+        self.options.n_frames
+    }
+
+    /// Returns the zero of the positions of frames, in world coordinates.
+    pub fn origin(&self) -> DVec3 {
+        self.scene.flat().origin
+    }
+
+    /// Renders a frame, by its index from 0, as [`PlannedMovie::render`] does.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the frame cannot be rendered, and if cancelled.
+    pub fn render_frame(&mut self, frame: u32, progress: &dyn Progress) -> Result<RenderedImage> {
+        frame_at(&mut self.scene, f64::from(frame) / self.options.fps, progress)
+    }
+}
+
+/// Renders the frames that a movie lacks, each at a time in seconds, and finishes it.
 ///
 /// # Errors
 ///
 /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
-pub fn animate(
-    scene: &mut BuiltScene,
+pub(crate) fn write_movie(
     output: &Path,
     options: &MovieOptions,
     resumes: bool,
     progress: &dyn Progress,
+    mut frame_at: impl FnMut(f64) -> Result<RenderedImage>,
 ) -> Result<()> {
     let mut movie = open(output, options, resumes, progress)?;
     let n_frames = options.n_frames;
     for frame in 0..n_frames {
         if !movie.has_frame(frame) {
-            let image = render_frame(scene, f64::from(frame) / options.fps, progress);
+            let image = frame_at(f64::from(frame) / options.fps);
             let added = image.and_then(|image| Ok(movie.add_frame(frame, &image)?));
             added.map_err(|error| unfinished(error, movie.n_done(), n_frames))?;
         }
@@ -232,11 +273,7 @@ fn finish(movie: Movie, n_frames: u32, progress: &dyn Progress) -> Result<()> {
 }
 
 /// Renders the frame of a movie at a time in seconds.
-///
-/// # Errors
-///
-/// Fails if the frame cannot be rendered, and if cancelled.
-pub fn render_frame(
+fn frame_at(
     scene: &mut BuiltScene,
     time_secs: f64,
     progress: &dyn Progress,

@@ -1,10 +1,10 @@
 //! A cache of the last two results of long work, shared by threads.
 
 use crate::error::Result;
+use crate::locks::lock_unless_cancelled;
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use surfel_core::progress::Progress;
 
 /// The last two results, by the hashes of what they were made from: people who compare settings go back and forth.
@@ -19,9 +19,6 @@ pub struct Lru2<T> {
 type Entries<T> = VecDeque<(u64, Arc<T>)>;
 
 const CAPACITY: usize = 2;
-
-/// Time between two looks at a lock that another thread holds.
-const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl<T> Default for Lru2<T> {
     fn default() -> Self {
@@ -41,7 +38,7 @@ impl<T> Lru2<T> {
         if let Some(known) = self.find(key) {
             return Ok(known);
         }
-        let _making = self.wait_to_make(progress)?;
+        let _making = lock_unless_cancelled(&self.making, progress)?;
         // Another caller may have made it in the meantime.
         if let Some(known) = self.find(key) {
             return Ok(known);
@@ -86,20 +83,6 @@ impl<T> Lru2<T> {
     fn entries(&self) -> MutexGuard<'_, Entries<T>> {
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
-
-    /// Waits until no other result is made. Unlike `Mutex::lock`, stops waiting when the caller is cancelled.
-    fn wait_to_make(&self, progress: &dyn Progress) -> Result<MutexGuard<'_, ()>> {
-        loop {
-            match self.making.try_lock() {
-                Ok(guard) => return Ok(guard),
-                Err(TryLockError::Poisoned(error)) => return Ok(PoisonError::into_inner(error)),
-                Err(TryLockError::WouldBlock) => {
-                    progress.check()?;
-                    std::thread::sleep(LOCK_POLL_INTERVAL);
-                }
-            }
-        }
-    }
 }
 
 /// Returns a hash of a value's text, the same for equal values within a run of the program.
@@ -116,6 +99,7 @@ mod tests {
     use super::*;
     use std::sync::Barrier;
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
     use surfel_core::progress::NoProgress;
 
     struct Cancelled;

@@ -66,6 +66,7 @@ pub mod progress_log;
 pub mod overlay;
 pub mod resolve;
 pub mod picture;
+pub mod locks;
 mod cache;
 #[cfg(not(feature = "gpu"))]
 mod no_gpu;
@@ -92,7 +93,7 @@ pub use progress_log::Choice;
 pub use ray_query::RayHit;
 pub use renderer::SceneRenderer;
 pub use resolve::{Resolved, resolve};
-pub use thread_pools::RendererOnThreads;
+pub use thread_pools::{RendererOnThreads, start_global_threads, start_threads};
 
 /// The crates that this one stands on.
 #[cfg(feature = "gpu")]

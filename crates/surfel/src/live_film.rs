@@ -1,6 +1,6 @@
 //! Movies of a live scene, whose files are not read again.
 
-use crate::animate::{frame_count, movie_options};
+use crate::animate::{frame_count, movie_options, write_movie};
 use crate::built_scene::turn;
 use crate::description::SceneDescription;
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ use surfel_core::flat::FlatScene;
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::scene::Camera;
-use surfel_formats::{Movie, MovieOptions};
+use surfel_formats::MovieOptions;
 
 /// Returns the number of frames of the movie of a description.
 ///
@@ -45,13 +45,10 @@ pub fn film(
     let mut view = view_at(scene, description, 0.0, &quiet)?;
     let image = image_options(description, view.flat.origin);
     let options = MovieOptions { n_frames, image, ..movie_options(description) };
-    let mut movie = Movie::open(output, &options, false)?;
     let moves_objects = 0.0 < scene.loaded().duration_secs();
     let FlatScene { camera, lights, punctual_lights, .. } = &view.flat;
     let (camera, lights, lamps) = (*camera, lights.clone(), punctual_lights.clone());
-    progress.begin("film", u64::from(n_frames));
-    for frame in 0..n_frames {
-        let time_secs = f64::from(frame) / options.fps;
+    let written = write_movie(output, &options, false, progress, |time_secs| {
         if moves_objects {
             view = view_at(scene, description, time_secs, &quiet)?;
         } else {
@@ -63,16 +60,13 @@ pub fn film(
             let (up, room) = (up_of(&view), view.turned_room.as_ref());
             turn(&mut view.flat, up, room, TAU * time_secs / seconds);
         }
-        let mut picture = scene.render(&view, &quiet)?;
-        let mut overlay = view.overlay();
-        overlay.is_fixed = true;
-        overlay.draw(&mut picture, &view.flat.camera);
-        movie.add_frame(frame, &picture)?;
-        progress.advance(1);
+        Ok(view.finished_frame(scene.render(&view, &quiet)?))
+    });
+    match written {
+        // The page cannot continue a film.
+        Err(Error::Unfinished { cause, .. }) => Err(*cause),
+        written => written.map(|()| n_frames),
     }
-    progress.end();
-    movie.finish(progress).map_err(Error::from)?;
-    Ok(n_frames)
 }
 
 fn view_at(

@@ -1,8 +1,8 @@
-//! Pools of threads beside those of all work.
+//! Pools of threads: those of all work, and others beside them.
 
 use crate::description::RunSettings;
 use crate::error::{Error, Result};
-use rayon::ThreadPool;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
@@ -16,10 +16,22 @@ use thread_priority::ThreadPriority;
 /// Fails if the system denies them.
 pub fn start_threads(settings: &RunSettings, start: fn(usize)) -> Result<ThreadPool> {
     let n_threads = settings.threads.map_or_else(rayon::current_num_threads, |n| n as usize);
-    let threads =
-        rayon::ThreadPoolBuilder::new().num_threads(n_threads).start_handler(start).build();
-    let advice = "the threads cannot be started; ask for fewer with --threads";
-    threads.map_err(|error| Error::Unfit(format!("{advice}: {error}")))
+    let builder = ThreadPoolBuilder::new().num_threads(n_threads).start_handler(start);
+    builder.build().map_err(denied)
+}
+
+/// Starts the threads of all work to come: as many as the settings ask for, or else as there are processors.
+///
+/// # Errors
+///
+/// Fails if the system denies them, and if those of all work run already.
+pub fn start_global_threads(settings: &RunSettings) -> Result<()> {
+    let n_threads = settings.threads.unwrap_or(0) as usize;
+    ThreadPoolBuilder::new().num_threads(n_threads).build_global().map_err(denied)
+}
+
+fn denied(error: ThreadPoolBuildError) -> Error {
+    Error::Threads(error.to_string())
 }
 
 /// Gives the current thread the processor time that others leave. A system that denies this shares time evenly.

@@ -18,7 +18,7 @@ mod page_overlay;
 mod page_settings;
 mod scene_provider;
 
-use crate::global::{Global, start_threads};
+use crate::global::Global;
 use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::report::{Report, Verbosity, print};
 use crate::scene_args::SceneArgs;
@@ -33,7 +33,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use surfel::resolve::check_files;
-use surfel::{RendererOnThreads, SceneDescription, SceneRenderer};
+use surfel::{RendererOnThreads, SceneDescription, SceneRenderer, start_global_threads};
 use surfel_core::progress::Progress;
 use surfel_core::render::Renderer;
 use surfel_web::{Error, FrameAncestors, Limits, SceneProvider, Server, TlsError, TlsIdentity};
@@ -100,7 +100,7 @@ Examples:
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     freed_memory::keep_little();
     let description = args.scene.startup(global, report)?;
-    start_threads(&description.run)?;
+    start_global_threads(&description.run)?;
     let renderer = SceneRenderer::new(&description.run)?;
     check_files(&description)?;
     let identity = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
