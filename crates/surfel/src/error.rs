@@ -29,7 +29,7 @@ pub enum Error {
     #[error("{0}")]
     Unfit(String),
     /// A movie was not finished.
-    #[error("{cause}; {} kept, continue from there with --resume", frames(*n_done, *n_frames))]
+    #[error("{cause}; {} kept, continue from there [resume]", frames(*n_done, *n_frames))]
     Unfinished {
         /// The reason.
         cause: Box<Error>,

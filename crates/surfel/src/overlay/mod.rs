@@ -176,8 +176,8 @@ pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Inval
     let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
     let fault = |key: &str| {
         let advice = match is_orthographic {
-            false => "needs a camera without perspective: add --camera-orthographic",
-            true => "north is along the view; look down, as with --camera-direction 0,0,-1",
+            false => "needs a camera without perspective [camera.orthographic]",
+            true => "north is along the view; look down, as along 0,0,-1 [camera.direction]",
         };
         Invalid::at(key, advice)
     };
