@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use surfel::animate::{PlannedMovie, movie_options, render_frame};
 use surfel::description::Invalid;
-use surfel::{BuiltScene, RenderedImage};
+use surfel::{BuiltScene, Choice, RenderedImage};
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 use surfel_formats::MovieOptions;
@@ -65,6 +65,15 @@ pub struct PyFilm {
     threads: Option<ThreadPool>,
 }
 
+/// A rendered frame.
+struct Frame {
+    image: RenderedImage,
+    /// World coordinates of the zero of its positions.
+    origin: DVec3,
+    /// The choices that were made for the film.
+    choices: Vec<Choice>,
+}
+
 #[pymethods]
 impl PyFilm {
     #[new]
@@ -108,17 +117,17 @@ impl PyFilm {
     ) -> PyResult<PyImage> {
         self.check(index)?;
         work::run(py, progress, |progress| {
-            let (mut image, origin) = self.frame(index, progress)?;
+            let Frame { mut image, origin, choices } = self.frame(index, progress)?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
-            Ok(PyImage::new(image, origin, PixelIds::default(), Vec::new()))
+            Ok(PyImage::new(image, origin, PixelIds::default(), &choices))
         })
     }
 
     /// Renders a frame to a file as `animate` would write it, of .exr with all layers.
     fn _save(&self, py: Python<'_>, index: u32, path: PathBuf) -> PyResult<()> {
         self.check(index)?;
-        work::run(py, None, |progress| self.frame(index, progress)?.0.save(path))
+        work::run(py, None, |progress| self.frame(index, progress)?.image.save(path))
     }
 }
 
@@ -131,12 +140,11 @@ impl PyFilm {
         Err(PyIndexError::new_err(message))
     }
 
-    /// Renders a frame; returns it with the origin of its positions.
-    fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<(RenderedImage, DVec3)> {
+    fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<Frame> {
         let mut scene = work::locked(&self.scene, progress)?;
         let (scene, time_secs) = (&mut *scene, f64::from(index) / self.options.fps);
         let image = on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
-        Ok((image, scene.flat().origin))
+        Ok(Frame { image, origin: scene.flat().origin, choices: scene.choices().to_vec() })
     }
 }
 
