@@ -375,7 +375,7 @@ mod tests {
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
         let (picture, _) = everything();
         let error = faults(&picture, &camera, Vec3::Z).remove(0);
-        assert!(error.to_string().contains("--camera-orthographic"), "{error}");
+        assert!(error.to_string().ends_with("[camera.orthographic]"), "{error}");
         assert_eq!(error.path, "scale_bar");
     }
 }
