@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use surfel::animate::{PlannedMovie, movie_options, render_frame};
 use surfel::description::Invalid;
+use surfel::progress_log::ProgressLog;
 use surfel::{BuiltScene, Choice, RenderedImage};
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
@@ -63,14 +64,6 @@ pub struct PyFilm {
     /// About how many bytes the scene takes.
     memory_estimate: u64,
     threads: Option<ThreadPool>,
-}
-
-/// A rendered frame.
-struct Frame {
-    image: RenderedImage,
-    /// World coordinates of the zero of its positions.
-    origin: DVec3,
-    /// The choices that were made for the film.
     choices: Vec<Choice>,
 }
 
@@ -87,11 +80,12 @@ impl PyFilm {
         let description = with_keys(py, &scene.get().description(), keys)?;
         work::run(py, progress, |progress| {
             let threads = start_threads(&description.run)?;
-            let planned =
-                on_threads(threads.as_ref(), || PlannedMovie::new(&description, progress))?;
+            let log = ProgressLog::new(progress);
+            let planned = on_threads(threads.as_ref(), || PlannedMovie::new(&description, &log))?;
             let memory_estimate = planned.memory_estimate();
-            let (scene, options) = on_threads(threads.as_ref(), || planned.build(progress))?;
-            Ok(Self { scene: Mutex::new(scene), options, memory_estimate, threads })
+            let (scene, options) = on_threads(threads.as_ref(), || planned.build(&log))?;
+            let (scene, choices) = (Mutex::new(scene), log.into_records().choices);
+            Ok(Self { scene, options, memory_estimate, threads, choices })
         })
     }
 
@@ -117,17 +111,17 @@ impl PyFilm {
     ) -> PyResult<PyImage> {
         self.check(index)?;
         work::run(py, progress, |progress| {
-            let Frame { mut image, origin, choices } = self.frame(index, progress)?;
+            let (mut image, origin) = self.frame(index, progress)?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
-            Ok(PyImage::new(image, origin, PixelIds::default(), &choices))
+            Ok(PyImage::new(image, origin, PixelIds::default(), &self.choices))
         })
     }
 
     /// Renders a frame to a file as `animate` would write it, of .exr with all layers.
     fn _save(&self, py: Python<'_>, index: u32, path: PathBuf) -> PyResult<()> {
         self.check(index)?;
-        work::run(py, None, |progress| self.frame(index, progress)?.image.save(path))
+        work::run(py, None, |progress| self.frame(index, progress)?.0.save(path))
     }
 }
 
@@ -140,11 +134,12 @@ impl PyFilm {
         Err(PyIndexError::new_err(message))
     }
 
-    fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<Frame> {
+    /// Renders a frame; returns it with the origin of its positions.
+    fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<(RenderedImage, DVec3)> {
         let mut scene = work::locked(&self.scene, progress)?;
         let (scene, time_secs) = (&mut *scene, f64::from(index) / self.options.fps);
         let image = on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
-        Ok(Frame { image, origin: scene.flat().origin, choices: scene.choices().to_vec() })
+        Ok((image, scene.flat().origin))
     }
 }
 
