@@ -2,7 +2,7 @@
 
 use crate::cluster;
 use crate::global::{Global, check_device};
-use crate::options::{EVERYWHERE, PLANS, Scope};
+use crate::options::Scope;
 use crate::output::check_replaces_nothing;
 use crate::render::{report_threads, with_info};
 use crate::report::{Report, print};
@@ -10,6 +10,7 @@ use crate::scene_args::SceneArgs;
 use crate::usage::Usage;
 use std::path::{Path, PathBuf};
 use surfel::animate::{PlannedMovie, check_movie};
+use surfel::description::Section;
 use surfel::{SceneDescription, start_global_threads};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
@@ -24,22 +25,23 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Continues an interrupted run of the same movie.
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = Section::Output.heading())]
     resume: bool,
     /// Renders the frames on the workers of a Dask scheduler, as in tcp://scheduler:8786. They need the files under the
     /// same names and the Python package, which this machine needs too.
-    #[arg(long, value_name = "ADDRESS", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "ADDRESS", help_heading = Section::Output.heading(), hide_short_help = true)]
     cluster: Option<String>,
     /// Prints what would be done as a scene file on stdout, and renders nothing.
-    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, help_heading = Section::Output.heading(), hide_short_help = true)]
     dry_run: bool,
     #[command(flatten)]
     scene: SceneArgs<Args>,
 }
 
 impl Scope for Args {
-    fn has(heading: &str, path: &str) -> bool {
-        ![EVERYWHERE, PLANS].contains(&heading) && !["output", "time"].contains(&path)
+    fn has(section: Section, path: &str) -> bool {
+        ![Section::Everywhere, Section::Plans].contains(&section)
+            && !["output", "time"].contains(&path)
     }
 }
 

@@ -1,14 +1,14 @@
 //! Options of all commands: messages, threads, memory, device.
 
-use crate::options::{EVERYWHERE, KeyOptions, Scope};
+use crate::options::{KeyOptions, Scope};
 use crate::report::Verbosity;
 use clap::Args;
-use surfel::description::{Backend, RunSettings};
+use surfel::description::{Backend, RunSettings, Section};
 use surfel::{SceneRenderer, start_global_threads};
 
 /// Options of all commands.
 #[derive(Args, Clone, Debug)]
-#[command(next_help_heading = EVERYWHERE)]
+#[command(next_help_heading = Section::Everywhere.heading())]
 pub struct Global {
     /// Shows nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -22,8 +22,8 @@ pub struct Global {
 }
 
 impl Scope for Global {
-    fn has(heading: &str, _: &str) -> bool {
-        heading == EVERYWHERE
+    fn has(section: Section, _: &str) -> bool {
+        section == Section::Everywhere
     }
 }
 

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel::crs::short_name;
+use surfel::description::Section;
 use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::class_name;
 use surfel_core::math::{DVec3, Vec3};
@@ -38,7 +39,7 @@ pub struct Args {
 }
 
 impl Scope for Args {
-    fn has(_: &str, path: &str) -> bool {
+    fn has(_: Section, path: &str) -> bool {
         ["columns", "salvage"].contains(&path)
     }
 }

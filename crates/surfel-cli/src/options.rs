@@ -6,12 +6,13 @@ use serde_json::Value;
 use std::marker::PhantomData;
 use std::path::Path;
 use surfel::SceneDescription;
-use surfel::description::{Invalid, Key, has_option, is_list, option_name, value_text};
+use surfel::description::rule::Arity;
+use surfel::description::{Invalid, Key, Section, has_option, is_list, option_name, value_text};
 
 /// Arguments of a command, some of which are keys of a scene description.
 pub trait Scope {
-    /// Returns true if the command has the option of a key, by the heading of the key's part and the key's path.
-    fn has(heading: &str, path: &str) -> bool;
+    /// Returns true if the command has the option of a key, by the section and the path of the key.
+    fn has(section: Section, path: &str) -> bool;
 }
 
 /// The options of a command that are keys.
@@ -22,21 +23,13 @@ pub struct KeyOptions<S> {
     scope: PhantomData<S>,
 }
 
-/// Heading of the options that all commands have.
-pub const EVERYWHERE: &str = "Everywhere";
-/// Heading of the options of plans, which only pictures have.
-pub const PLANS: &str = "Plans to scale";
-
-/// Kinds of values that may begin with a hyphen, beside lists of numbers.
-const MAY_BEGIN_WITH_HYPHEN: [&str; 4] = ["AREA", "AXIS", "BOUNDS", "NAMES"];
-
-/// The keys of a scope with their paths and headings.
-fn keys<S: Scope>() -> impl Iterator<Item = (String, &'static str, Key)> {
+/// The keys of a scope with their paths and sections.
+fn keys<S: Scope>() -> impl Iterator<Item = (String, Section, Key)> {
     let keys = SceneDescription::keys().into_iter();
-    keys.filter(|(path, heading, _)| has_option(path) && S::has(heading, path))
+    keys.filter(|(path, section, _)| has_option(path) && S::has(*section, path))
 }
 
-fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
+fn option(path: &str, section: Section, key: &Key) -> Arg {
     let doc = key.doc.split_whitespace().collect::<Vec<_>>().join(" ");
     let default = match &key.default {
         Some(Value::Bool(false)) | None => String::new(),
@@ -46,27 +39,24 @@ fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
     let arg = Arg::new(path.to_owned())
         .long(option_name(path))
         .short((path == "threads").then_some('t'))
-        .global(heading == EVERYWHERE)
-        .help_heading(heading)
+        .global(section == Section::Everywhere)
+        .help_heading(section.heading())
+        .value_name(key.value_name)
+        .allow_hyphen_values(key.may_begin_with_hyphen)
         .help(format!("{}{default}", short.trim_end_matches('.')))
         .long_help(format!("{doc}{default}"))
         .hide_short_help(!key.is_common)
         .action(if is_list(path) { ArgAction::Append } else { ArgAction::Set });
-    match key.value_name {
-        "" | "BOOL" => {
-            let arg = arg.value_name("BOOL").num_args(0..=1).require_equals(true);
-            arg.default_missing_value("true")
-        }
-        "HEIGHT" => arg.value_name("HEIGHT").num_args(0..=1).default_missing_value("true"),
-        name => arg
-            .value_name(name)
-            .allow_hyphen_values(name.contains(',') || MAY_BEGIN_WITH_HYPHEN.contains(&name)),
+    match key.arity {
+        Arity::One => arg,
+        Arity::Optional => arg.num_args(0..=1).default_missing_value("true"),
+        Arity::Flag => arg.num_args(0..=1).require_equals(true).default_missing_value("true"),
     }
 }
 
 impl<S: Scope> Args for KeyOptions<S> {
     fn augment_args(command: Command) -> Command {
-        command.args(keys::<S>().map(|(path, heading, key)| option(&path, heading, &key)))
+        command.args(keys::<S>().map(|(path, section, key)| option(&path, section, &key)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -109,7 +99,7 @@ mod tests {
     struct AllKeys;
 
     impl Scope for AllKeys {
-        fn has(_: &str, _: &str) -> bool {
+        fn has(_: Section, _: &str) -> bool {
             true
         }
     }
@@ -137,9 +127,19 @@ mod tests {
 
     #[test]
     fn values_may_begin_with_a_hyphen() {
-        let words = "--crop -10,-10,10,10 --clip-box -1,-2,-3,1,2,3 --up -Y --range -5,5 --clip-plane -1,0,0,-1,0,0";
+        let words = "--crop -10,-10,10,10 --clip-box -1,-2,-3,1,2,3 --up -Y --range -5,5 --clip-plane -1,0,0,-1,0,0 \
+                     --columns -,y,x,z --place -33.9,18.4 --camera-direction -1,0,0";
         let description = parse(words.split_whitespace());
-        for key in ["crop", "clip_box", "up", "range", "clip_plane"] {
+        for key in [
+            "crop",
+            "clip_box",
+            "up",
+            "range",
+            "clip_plane",
+            "columns",
+            "place",
+            "camera.direction",
+        ] {
             assert!(description.get(key).is_some(), "{key}");
         }
     }

@@ -7,7 +7,8 @@ use crate::output::{check_cloud, check_replaces_nothing};
 use crate::report::Report;
 use std::path::PathBuf;
 use surfel::SceneDescription;
-use surfel::prepare::{PrepareOptions, prepare_files};
+use surfel::description::Section;
+use surfel::prepare::{PointSource, PrepareOptions, prepare_points};
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 use surfel_formats::{Loaded, SaveOptions};
@@ -25,18 +26,18 @@ pub struct Args {
     /// Adds normals. Normals and radii are both added if you choose no step: none of --normals, --normals-k,
     /// --normals-radius, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --subsample,
     /// --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
-    #[arg(long, help_heading = "Preparation")]
+    #[arg(long, help_heading = Section::Preparation.heading())]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
-    #[arg(long, help_heading = "Preparation")]
+    #[arg(long, help_heading = Section::Preparation.heading())]
     keep_variation: bool,
     #[command(flatten)]
     options: KeyOptions<Args>,
 }
 
 impl Scope for Args {
-    fn has(heading: &str, path: &str) -> bool {
-        let is_of_points = heading == "Preparation";
+    fn has(section: Section, path: &str) -> bool {
+        let is_of_points = section == Section::Preparation;
         path == "seed" || (is_of_points && !["vertices", "animation_name"].contains(&path))
     }
 }
@@ -69,7 +70,8 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     // What a preparation drops would be lost.
     check_replaces_nothing(&[("-o", &args.output)], files.iter().chain(description.named_files()))?;
     let options = PrepareOptions { normals: args.normals, keep_variation: args.keep_variation };
-    let Loaded { cloud, info } = prepare_files(&files, &description, options, report)?;
+    let sources = files.into_iter().map(PointSource::File).collect();
+    let Loaded { cloud, info } = prepare_points(sources, &description, options, report)?;
     let options = SaveOptions::from_source(&info);
     surfel_formats::save(&args.output, &cloud, &options, report)?;
     report.end();

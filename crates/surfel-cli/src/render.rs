@@ -1,7 +1,7 @@
 //! `surfel render`: from files to a picture.
 
 use crate::global::{Global, check_device};
-use crate::options::{EVERYWHERE, Scope};
+use crate::options::Scope;
 use crate::output::{check_height_map, check_picture, check_replaces_nothing, check_stats};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
@@ -10,7 +10,7 @@ use crate::usage::Usage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use surfel::description::Backend;
+use surfel::description::{Backend, Section};
 use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
 use surfel::{SceneDescription, start_global_threads};
 use surfel_core::progress::Progress;
@@ -25,18 +25,18 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Writes numbers about the run as JSON; - for stdout.
-    #[arg(long, value_name = "FILE", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "FILE", help_heading = Section::Output.heading(), hide_short_help = true)]
     stats: Option<PathBuf>,
     /// Prints what would be done as a scene file on stdout, and renders nothing.
-    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, help_heading = Section::Output.heading(), hide_short_help = true)]
     dry_run: bool,
     #[command(flatten)]
     scene: SceneArgs<Args>,
 }
 
 impl Scope for Args {
-    fn has(heading: &str, path: &str) -> bool {
-        heading != EVERYWHERE && !["output", "frames", "fps", "turntable"].contains(&path)
+    fn has(section: Section, path: &str) -> bool {
+        section != Section::Everywhere && !["output", "frames", "fps", "turntable"].contains(&path)
     }
 }
 

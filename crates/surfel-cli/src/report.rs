@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Instant;
 use surfel::SceneDescription;
 use surfel::description::{Invalid, option_name};
-use surfel_core::progress::Progress;
+use surfel_core::progress::{Progress, with_keys};
 
 /// The amount of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,12 +64,29 @@ impl<'l> Report<'l> {
 
     /// Reports an error as the last line.
     pub fn error(&self, error: &anyhow::Error) {
-        self.end();
+        self.close_stage();
         let text = match invalid_option(error) {
             Some(text) => text,
             None => format!("{error:#}"),
         };
-        say(&format!("error: {}", text.replace('\n', " ")));
+        say(&format!("error: {}", with_options(&text.replace('\n', " "))));
+    }
+
+    /// Takes the bar away and, if asked for, shows how long the stage took.
+    fn close_stage(&self) {
+        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
+        bar.finish_and_clear();
+        let ended = self.stage.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let (Some((stage, start)), Verbosity::Verbose) = (ended, self.verbosity) {
+            say(&format!("{stage}: {:.2} s", start.elapsed().as_secs_f64()));
+        }
+    }
+
+    /// Shows a line beside the bar, unless errors alone are shown.
+    fn show(&self, line: &str) {
+        if self.verbosity != Verbosity::Quiet {
+            self.bar.read().unwrap_or_else(PoisonError::into_inner).suspend(|| say(line));
+        }
     }
 
     fn shows_bars(&self) -> bool {
@@ -79,7 +96,7 @@ impl<'l> Report<'l> {
 
 impl Progress for Report<'_> {
     fn begin(&self, stage: &str, total: u64) {
-        self.end();
+        self.close_stage();
         self.listener.inspect(|listener| listener.begin(stage, total));
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
             Some((stage.to_owned(), Instant::now()));
@@ -94,32 +111,51 @@ impl Progress for Report<'_> {
     }
 
     fn note(&self, line: &str) {
-        if self.verbosity == Verbosity::Quiet {
-            return;
-        }
-        self.bar.read().unwrap_or_else(PoisonError::into_inner).suspend(|| say(line));
+        self.listener.inspect(|listener| listener.note(line));
+        self.show(&with_options(line));
     }
 
     fn choice(&self, line: &str, keys: &[&str]) {
-        let options: Vec<String> =
-            keys.iter().map(|key| format!("--{}", option_name(key))).collect();
-        self.note(&format!("{line} [{}]", options.join(", ")));
+        self.listener.inspect(|listener| listener.choice(line, keys));
+        self.show(&with_keys(line, &options(keys)));
     }
 
-    /// Takes the bar away and, if asked for, shows how long the stage took.
+    fn warning(&self, line: &str, keys: &[&str]) {
+        self.listener.inspect(|listener| listener.warning(line, keys));
+        self.show(&format!("warning: {}", with_keys(line, &options(keys))));
+    }
+
     fn end(&self) {
-        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
-        bar.finish_and_clear();
-        let ended = self.stage.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let (Some((stage, start)), Verbosity::Verbose) = (ended, self.verbosity) {
-            say(&format!("{stage}: {:.2} s", start.elapsed().as_secs_f64()));
-        }
+        self.listener.inspect(|listener| listener.end());
+        self.close_stage();
     }
 
     fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
             || self.listener.is_some_and(|listener| listener.is_cancelled())
     }
+}
+
+/// Returns the options of keys.
+fn options(keys: &[&str]) -> Vec<String> {
+    keys.iter().map(|key| format!("--{}", option_name(key))).collect()
+}
+
+/// Replaces the keys that messages of libraries name in brackets by their options.
+fn with_options(text: &str) -> String {
+    let known = SceneDescription::keys();
+    // Movies are continued by an option that is no key.
+    let is_known = |key: &&str| *key == "resume" || known.iter().any(|(path, ..)| path == key);
+    let replaced = |part: &str| {
+        let (keys, rest) = part.split_once(']')?;
+        let keys: Vec<&str> = keys.split(", ").collect();
+        let are_known = keys.iter().all(is_known);
+        are_known.then(|| format!("[{}]{rest}", options(&keys).join(", ")))
+    };
+    let mut parts = text.split('[');
+    let start = parts.next().unwrap_or_default().to_owned();
+    let others = parts.map(|part| replaced(part).unwrap_or_else(|| format!("[{part}")));
+    others.fold(start, |text, part| text + &part)
 }
 
 /// Names the option of a value that is not valid, unless a scene file has it.
@@ -138,14 +174,13 @@ fn invalid_option(error: &anyhow::Error) -> Option<String> {
     if !keys.iter().all(|key| known.iter().any(|(path, ..)| path == key)) {
         return None;
     }
-    let options: Vec<String> = keys.iter().map(|key| format!("--{}", option_name(key))).collect();
     let reason = invalid.reason();
     let excluded = reason.strip_prefix("excludes ").and_then(|rest| rest.split_once(';'));
     let reason = match excluded {
         Some((other, advice)) => format!("excludes --{};{advice}", option_name(other)),
         None => reason,
     };
-    Some(format!("{}: {property}{reason}", options.join(", ")))
+    Some(format!("{}: {property}{reason}", options(&keys).join(", ")))
 }
 
 fn new_bar(stage: &str, total: u64) -> ProgressBar {
@@ -171,5 +206,43 @@ pub fn print(line: &str) -> std::io::Result<()> {
     match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Keys in messages, and reports that are passed on.
+
+    use super::*;
+    use surfel::progress_log::{ProgressLog, Records};
+    use surfel_core::progress::NoProgress;
+
+    #[test]
+    fn keys_in_brackets_become_options() {
+        for (text, expected) in [
+            ("cut short; what is whole can be read [salvage]", "can be read [--salvage]"),
+            (
+                "stopped [resume]: too large [resolution, memory_limit]",
+                "[--resolution, --memory-limit]",
+            ),
+            ("stopped [resume]: no", "stopped [--resume]: no"),
+            ("two numbers as in [0, 255]", "as in [0, 255]"),
+            ("object[2].file: no [salvage", "object[2].file: no [salvage"),
+            ("all [color, colour]", "all [color, colour]"),
+        ] {
+            assert!(with_options(text).ends_with(expected), "{}", with_options(text));
+        }
+    }
+
+    #[test]
+    fn listeners_hear_of_notes_choices_and_warnings() {
+        let log = ProgressLog::new(&NoProgress);
+        let report = Report::new(Verbosity::Quiet).with_listener(&log);
+        report.note("one point");
+        report.choice("up is +Z", &["up"]);
+        report.warning("no effect", &["reach"]);
+        let Records { choices, notes, warnings } = log.into_records();
+        let lines = [notes[0].clone(), choices[0].to_string(), warnings[0].to_string()];
+        assert_eq!(lines, ["one point", "up is +Z [up]", "no effect [reach]"]);
     }
 }

@@ -7,7 +7,7 @@ use crate::report::Report;
 use clap::Args;
 use std::path::PathBuf;
 use surfel::SceneDescription;
-use surfel::description::{Invalid, is_scene_file};
+use surfel::description::{Invalid, Section, is_scene_file};
 use surfel_core::scene::Background;
 use surfel_formats::FORMATS;
 
@@ -17,7 +17,7 @@ pub struct SceneArgs<S: Scope> {
     #[arg(value_name = "FILE", required = true, help = files_help())]
     pub files: Vec<PathBuf>,
     /// Short for --background transparent.
-    #[arg(long, conflicts_with = "background", help_heading = "Picture", hide_short_help = true)]
+    #[arg(long, conflicts_with = "background", help_heading = Section::Picture.heading(), hide_short_help = true)]
     no_background: bool,
     #[command(flatten)]
     options: KeyOptions<S>,

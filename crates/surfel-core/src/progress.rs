@@ -12,15 +12,20 @@ pub trait Progress: Sync {
     /// Adds `units` to the finished work of the current stage.
     fn advance(&self, _units: u64) {}
 
-    /// Reports an automatic choice or a number of repairs in one line.
+    /// Reports in one line what was found or done, as a number of repairs.
     fn note(&self, _line: &str) {}
 
-    /// One line about a choice made from the data, with the keys of the settings that override it.
+    /// Reports in one line a choice made from the data, with the keys of the settings that override it.
     fn choice(&self, line: &str, keys: &[&str]) {
-        self.note(&format!("{line} [{}]", keys.join(", ")));
+        self.note(&with_keys(line, keys));
     }
 
-    /// The current stage has ended.
+    /// Reports in one line what is probably not meant, with the keys of the settings that concern it, if there are any.
+    fn warning(&self, line: &str, keys: &[&str]) {
+        self.note(&format!("warning: {}", with_keys(line, keys)));
+    }
+
+    /// Ends the current stage.
     fn end(&self) {}
 
     /// Returns true once the work should stop. The work asks many times a second.
@@ -36,6 +41,12 @@ pub trait Progress: Sync {
     fn check(&self) -> Result<()> {
         if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
+}
+
+/// Returns a line with the keys of settings behind it, in brackets; without any, the line.
+pub fn with_keys(line: &str, keys: &[impl AsRef<str>]) -> String {
+    let names: Vec<&str> = keys.iter().map(AsRef::as_ref).collect();
+    if names.is_empty() { line.to_owned() } else { format!("{line} [{}]", names.join(", ")) }
 }
 
 /// Ignores all reports and never cancels.

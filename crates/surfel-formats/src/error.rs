@@ -88,7 +88,7 @@ pub enum Error {
     /// The frames of an unfinished movie were rendered with other settings.
     #[error(
         "{file}: its frames were begun as `{found}`, and are now requested as `{expected}`; \
-         request the same again, or run without --resume to start again"
+         request the same again, or start again instead of resuming [resume]"
     )]
     ResumeMismatch {
         /// Name of the movie.

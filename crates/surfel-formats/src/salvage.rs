@@ -42,7 +42,7 @@ impl<'a> Salvage<'a> {
             return Err(error);
         };
         if !self.is_on {
-            advice.to_mut().push_str("; --salvage reads what is whole");
+            advice.to_mut().push_str("; what is whole can be read [salvage]");
             return Err(error);
         }
         Ok(error)

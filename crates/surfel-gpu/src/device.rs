@@ -419,8 +419,9 @@ mod tests {
         assert_eq!(message(&gpu, 3 << 30), expected);
         gpu.memory_limit = Some(1 << 20);
         assert_eq!(gpu.check_memory(1 << 20), Ok(()));
-        let expected =
-            format!("{name}: 1.5 MiB of memory are needed, and --memory-limit is 1.0 MiB");
+        let expected = format!(
+            "{name}: 1.5 MiB of memory are needed, and the limit is 1.0 MiB [memory_limit]"
+        );
         assert_eq!(message(&gpu, 3 << 19), expected);
     }
 

@@ -39,7 +39,7 @@ pub enum Error {
         needed: u64,
     },
     /// A picture needs more of a device's memory than is allowed.
-    #[error("{device}: {} of memory are needed, and --memory-limit is {}", readable(*.needed), readable(*.limit))]
+    #[error("{device}: {} of memory are needed, and the limit is {} [memory_limit]", readable(*.needed), readable(*.limit))]
     MemoryLimit {
         /// Name of the device.
         device: String,

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::crs::CoordinateSystem;
 use surfel::memory_files::MemoryContent;
-use surfel_core::image::decode_srgb;
+use surfel_core::image::{decode_srgb, encode_srgb};
 use surfel_core::math::{DVec3, Vec3, Vec4};
 use surfel_core::points::{PointCloud, Scalar, Values};
 use surfel_core::scene::Mesh;
@@ -117,10 +117,7 @@ impl PyCloud {
     /// World coordinates of the points: float64, (N, 3), a copy.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let n_points = self.cloud.len();
-        let world = |i| self.cloud.world_position(i).to_array();
-        let rows: Vec<[f64; 3]> = work::detached(py, || (0..n_points).map(world).collect())?;
-        owned_array(py, bytemuck::cast_vec::<[f64; 3], f64>(rows), vec![n_points, 3])
+        world_positions(py, &self.cloud.positions, self.cloud.origin)
     }
 
     /// World coordinates of the zero of `local_points`.
@@ -215,6 +212,17 @@ impl PyCloud {
     fn __repr__(&self) -> String {
         format!("<surfel.Cloud of {}>", counted(self.cloud.len(), "point"))
     }
+}
+
+/// Returns positions relative to `origin` in world coordinates: float64, (N, 3), a copy.
+fn world_positions<'py>(
+    py: Python<'py>,
+    positions: &[Vec3],
+    origin: DVec3,
+) -> PyResult<Bound<'py, PyAny>> {
+    let world = |position: &Vec3| (origin + position.as_dvec3()).to_array();
+    let rows = work::detached(py, || positions.iter().map(world).collect::<Vec<[f64; 3]>>())?;
+    owned_array(py, bytemuck::cast_vec::<[f64; 3], f64>(rows), vec![positions.len(), 3])
 }
 
 /// Returns a cloud, which is made of an array or of a cloud of another package.
@@ -341,6 +349,40 @@ impl PyMesh {
             values.map_or(Ok(()), |values| columns.set_item(name, values))?;
         }
         Ok(Self { mesh: Arc::new(mesh_of(py, &columns)?) })
+    }
+
+    /// World coordinates of the vertices: float64, (N, 3), a copy.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        world_positions(py, &self.mesh.positions, self.mesh.origin)
+    }
+
+    /// Indices of each triangle's vertices, counter-clockwise seen from the front: uint32, (M, 3).
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let triangles = &self.mesh.triangles;
+        shared_array(py, &self.mesh, triangles.as_flattened(), vec![triangles.len(), 3])
+    }
+
+    /// Unit normals of the vertices: float32, (N, 3), or `None`.
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let normals = self.mesh.normals.as_deref();
+        let shared = |normals: &[Vec3]| {
+            let numbers = bytemuck::cast_slice::<Vec3, f32>(normals);
+            shared_array(py, &self.mesh, numbers, vec![normals.len(), 3])
+        };
+        normals.map(shared).transpose()
+    }
+
+    /// sRGB colours of the vertices: uint16, (N, 3), a copy, or `None`.
+    #[getter]
+    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(colors) = &self.mesh.colors else { return Ok(None) };
+        let encoded = |channel: f32| (65535.0 * encode_srgb(channel)).round() as u16;
+        let rgb = |color: &Vec4| color.truncate().to_array().map(encoded);
+        let rows = work::detached(py, || colors.iter().flat_map(rgb).collect::<Vec<u16>>())?;
+        owned_array(py, rows, vec![colors.len(), 3]).map(Some)
     }
 
     fn __repr__(&self) -> String {

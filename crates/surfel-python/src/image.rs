@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
-use surfel::RenderedImage;
+use surfel::{Choice, RenderedImage};
 use surfel_core::image::{Aovs, Image, encode_srgba8};
 use surfel_core::math::{DVec3, Vec3};
 
@@ -39,7 +39,8 @@ pub struct PixelIds {
 
 impl PyImage {
     /// A picture whose positions count from `origin`; `choices` are those that were made from the data.
-    pub fn new(image: RenderedImage, origin: DVec3, ids: PixelIds, choices: Vec<String>) -> Self {
+    pub fn new(image: RenderedImage, origin: DVec3, ids: PixelIds, choices: &[Choice]) -> Self {
+        let choices = choices.iter().map(ToString::to_string).collect();
         let (positions, srgb) = (OnceLock::new(), OnceLock::new());
         Self { shared: Arc::new(Shared { image, origin, ids, choices, positions, srgb }) }
     }

@@ -38,7 +38,7 @@ mod native {
     #[pymodule_export]
     use crate::movie::{PyFilm, animate};
     #[pymodule_export]
-    use crate::preparation::prepare;
+    use crate::preparation::{prepare, read_cloud};
     #[pymodule_export]
     use crate::program::run_program;
     #[pymodule_export]

@@ -16,6 +16,8 @@ use surfel::RenderedImage;
 use surfel::animate::{BuiltMovie, PlannedMovie, check_movie};
 use surfel::description::Invalid;
 use surfel::locks::lock_unless_cancelled;
+use surfel::progress_log::ProgressLog;
+use surfel::{Choice, RenderedImage};
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 
@@ -62,6 +64,7 @@ pub struct PyFilm {
     /// About how many bytes the scene takes.
     memory_estimate: u64,
     threads: Option<ThreadPool>,
+    choices: Vec<Choice>,
 }
 
 #[pymethods]
@@ -77,12 +80,13 @@ impl PyFilm {
         let description = with_keys(py, &scene.get().description(), keys)?;
         work::run(py, progress, |progress| {
             let threads = own_threads(&description.run)?;
-            let planned =
-                on_threads(threads.as_ref(), || PlannedMovie::new(&description, progress))?;
+            let log = ProgressLog::new(progress);
+            let planned = on_threads(threads.as_ref(), || PlannedMovie::new(&description, &log))?;
             let memory_estimate = planned.memory_estimate();
-            let movie = on_threads(threads.as_ref(), || planned.build(progress))?;
+            let movie = on_threads(threads.as_ref(), || planned.build(&log))?;
             let n_frames = movie.n_frames();
-            Ok(Self { movie: Mutex::new(movie), n_frames, memory_estimate, threads })
+            let (movie, choices) = (Mutex::new(movie), log.into_records().choices);
+            Ok(Self { movie, n_frames, memory_estimate, threads, choices })
         })
     }
 
@@ -111,7 +115,7 @@ impl PyFilm {
             let (mut image, origin) = self.frame(index, progress)?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
-            Ok(PyImage::new(image, origin, PixelIds::default(), Vec::new()))
+            Ok(PyImage::new(image, origin, PixelIds::default(), &self.choices))
         })
     }
 

@@ -16,25 +16,30 @@ pub type SceneSlot = Arc<Mutex<Option<Arc<OpenScene>>>>;
 pub struct OpenScene {
     /// The files' content.
     pub scene: LiveScene,
+    /// The choices that were made while the files were read.
+    choices: Vec<Choice>,
     /// Held by those who work on the scene's own threads. One does at a time: a thread that waits inside its work would take
     /// up another's, which may wait for a lock that the first holds.
     turn: Mutex<()>,
-    /// The view of the last description, and the choices that were made for it.
+    /// The view of the last description.
     last: Mutex<Option<Arc<ChosenView>>>,
 }
 
-/// A view with its description and the choices that were made for it.
+/// A view with its description and all choices that were made for it.
 pub struct ChosenView {
     description: SceneDescription,
     pub view: LiveView,
+    /// The choices, with those that were made while the files were read.
     pub choices: Vec<Choice>,
 }
 
 impl OpenScene {
     /// Reads the files of a description.
     pub fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
-        let scene = LiveScene::open(description, UseCase::Pictures, progress)?;
-        Ok(Self { scene, turn: Mutex::default(), last: Mutex::default() })
+        let log = ProgressLog::new(progress);
+        let scene = LiveScene::open(description, UseCase::Pictures, &log)?;
+        let choices = log.into_records().choices;
+        Ok(Self { scene, choices, turn: Mutex::default(), last: Mutex::default() })
     }
 
     /// Returns the view under a description, which is made unless it is the last one.
@@ -47,14 +52,14 @@ impl OpenScene {
         if let Some(last) = last.filter(|last| last.description == description) {
             return Ok(last);
         }
-        let log = ProgressLog::new(progress);
+        let log = ProgressLog::after(self.choices.clone(), progress);
         let mut applied = description.clone();
         applied.apply_object_settings()?;
         if applied.materials != self.scene.startup().materials {
             check_files(&applied)?;
         }
         let view = self.install(progress, |scene| scene.view(&applied, &log))?;
-        let choices = log.into_choices();
+        let choices = log.into_records().choices;
         let view = Arc::new(ChosenView { description, view, choices });
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
         Ok(view)

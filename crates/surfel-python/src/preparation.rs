@@ -1,23 +1,51 @@
-//! Clouds that are prepared and kept.
+//! Clouds that are read, or prepared, and kept.
 
 use crate::cloud::{PyCloud, to_cloud};
 use crate::errors::invalid_setting;
 use crate::threads::{on_threads, own_threads};
 use crate::value::with_keys;
 use crate::work;
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::ffi::CString;
 use std::path::PathBuf;
-use std::sync::Arc;
-use surfel::description::Invalid;
-use surfel::prepare::{PrepareOptions, prepare_files, prepare_points};
-use surfel::progress_log::ProgressLog;
-use surfel::{Choice, SceneDescription};
-use surfel_core::points::PointCloud;
+use surfel::SceneDescription;
+use surfel::description::{Invalid, KeyedSettings, Part, Section};
+use surfel::prepare::{PointSource, PrepareOptions, prepare_points, read_points};
 use surfel_core::progress::Progress;
-use surfel_formats::{ColumnChoice, FileInfo, LoadOptions, Loaded, SaveOptions, merge_loaded};
+use surfel_formats::{FileInfo, Loaded, SaveOptions};
+
+/// Reads the points of a file, or of several that become one cloud, with all columns: of a mesh its vertices.
+///
+/// Keywords are the keys of reading in scene files: `filter`, `class`, `returns`, `crop`, `columns`, `salvage` and `reproject`,
+/// besides `threads` and `memory_limit`. Coordinates in degrees of longitude and latitude stay, with a warning, unless
+/// `reproject=True` moves them to metres. `progress` is called as `progress(stage, done, total)`.
+///
+/// Raises `MissingFile`, `InvalidFile`, `InvalidSetting`, `InvalidScene` if no point is kept, `OutOfMemory`.
+#[pyfunction]
+#[pyo3(signature = (*paths, progress = None, **keys))]
+pub fn read_cloud(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    progress: Option<&Bound<'_, PyAny>>,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<PyCloud> {
+    const KEYS: [&str; 9] = [
+        "filter",
+        "class",
+        "returns",
+        "crop",
+        "columns",
+        "salvage",
+        "reproject",
+        "threads",
+        "memory_limit",
+    ];
+    let description = with_keys(py, &SceneDescription::default(), keys)?;
+    check_keys(&description, |_, name| KEYS.contains(&name), "reading; give it to prepare or load")
+        .map_err(|error| invalid_setting(py, error))?;
+    let sources = paths.into_iter().map(PointSource::File).collect();
+    made(py, progress, &description, |progress| read_points(sources, &description, progress))
+}
 
 /// Cleans a cloud, and adds normals and radii: of a file, of a `Cloud` or what it takes, or of several that become one.
 ///
@@ -38,103 +66,64 @@ pub fn prepare(
     progress: Option<&Bound<'_, PyAny>>,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyCloud> {
+    const OTHERS: [&str; 3] = ["seed", "threads", "memory_limit"];
     let description = with_keys(py, &SceneDescription::default(), keys)?;
-    check_keys(&description).map_err(|error| invalid_setting(py, error))?;
+    let is_known = |part: &Part<&dyn KeyedSettings>, name: &str| {
+        part.section == Section::Preparation || OTHERS.contains(&name)
+    };
+    check_keys(&description, is_known, "preparation; give it to load or render")
+        .map_err(|error| invalid_setting(py, error))?;
     let options = PrepareOptions { normals, keep_variation };
-    let sources = sources.iter().map(Source::new).collect::<PyResult<Vec<_>>>()?;
-    let (prepared, choices) = work::run(py, progress, |progress| {
+    let sources = sources.iter().map(source).collect::<PyResult<Vec<_>>>()?;
+    made(py, progress, &description, |progress| {
+        prepare_points(sources, &description, options, progress)
+    })
+}
+
+/// Returns the cloud that `work` makes on the threads of a description.
+fn made(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    description: &SceneDescription,
+    work: impl FnOnce(&dyn Progress) -> surfel::Result<Loaded> + Send,
+) -> PyResult<PyCloud> {
+    let Loaded { cloud, info } = work::run(py, progress, |progress| {
         let threads = own_threads(&description.run)?;
-        let log = ProgressLog::new(progress);
-        let prepared = on_threads(threads.as_ref(), || match files(&sources) {
-            Some(files) => prepare_files(&files, &description, options, &log),
-            None => {
-                let loaded = merged(sources, &description, &log)?;
-                prepare_points(loaded, &description, options, &log)
-            }
-        })?;
-        Ok((prepared, log.into_choices()))
+        on_threads(threads.as_ref(), || work(progress))
     })?;
-    warn(py, &choices)?;
-    let Loaded { cloud, info } = prepared;
     Ok(PyCloud::new(cloud, SaveOptions::from_source(&info)))
 }
 
-/// Raises a `UserWarning` for each choice that is a warning.
-fn warn(py: Python<'_>, choices: &[Choice]) -> PyResult<()> {
-    for Choice { reason, keys } in choices {
-        if let Some(text) = reason.strip_prefix("warning: ") {
-            let text = CString::new(format!("{text} [{}]", keys.join(", ")))?;
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
-        }
+/// Returns the points of a file, of a cloud, or of what becomes a cloud.
+fn source(source: &Bound<'_, PyAny>) -> PyResult<PointSource> {
+    if let Ok(path) = source.extract::<PathBuf>() {
+        return Ok(PointSource::File(path));
     }
-    Ok(())
-}
-
-/// Points that are prepared: a cloud, or those of a file.
-enum Source {
-    Cloud(Arc<PointCloud>, Box<FileInfo>),
-    File(PathBuf),
-}
-
-impl Source {
-    fn new(source: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(path) = source.extract::<PathBuf>() {
-            return Ok(Self::File(path));
-        }
-        let cloud = to_cloud(source)?;
-        let cloud = cloud.get();
-        Ok(Self::Cloud(cloud.cloud.clone(), Box::new(info(&cloud.options))))
-    }
-}
-
-/// Returns the files, if all sources are files.
-fn files(sources: &[Source]) -> Option<Vec<PathBuf>> {
-    let file = |source: &Source| match source {
-        Source::File(file) => Some(file.clone()),
-        Source::Cloud(..) => None,
-    };
-    sources.iter().map(file).collect()
-}
-
-/// Reads sources as one cloud, with all points: they are filtered when they are prepared.
-fn merged(
-    sources: Vec<Source>,
-    description: &SceneDescription,
-    progress: &dyn Progress,
-) -> surfel::Result<Loaded> {
-    let preparation = &description.objects_default.preparation;
-    let options = preparation.load_options(ColumnChoice::All)?;
-    let options = LoadOptions { filter: None, ..options };
-    let (mut parts, mut names) = (Vec::new(), Vec::new());
-    for source in sources {
-        match source {
-            Source::Cloud(cloud, info) => {
-                names.push(PathBuf::from(format!("cloud {}", names.len())));
-                parts.push(Loaded { cloud: Arc::unwrap_or_clone(cloud), info: *info });
-            }
-            Source::File(file) => {
-                parts.push(surfel_formats::load(&file, &options, progress)?);
-                names.push(file);
-            }
-        }
-    }
-    Ok(merge_loaded(parts, &names, progress))
+    let cloud = to_cloud(source)?;
+    let cloud = cloud.get();
+    Ok(PointSource::Cloud(cloud.cloud.clone(), Box::new(info(&cloud.options))))
 }
 
 /// Returns what the properties of a saved cloud tell about the file that it came from.
 fn info(options: &SaveOptions) -> FileInfo {
     let SaveOptions { resolution, coordinate_system, las } = options.clone();
-    FileInfo { resolution, coordinate_system, las, ..FileInfo::default() }
+    let format = "in memory".to_owned();
+    FileInfo { format, resolution, coordinate_system, las, ..FileInfo::default() }
 }
 
-/// Fails for keys that do not concern points.
-fn check_keys(description: &SceneDescription) -> Result<(), Invalid> {
-    const OTHERS: [&str; 3] = ["seed", "threads", "memory_limit"];
-    for part in description.parts().iter().filter(|part| part.heading != "Preparation") {
-        let set = |name: &str| part.settings.get(name).is_some() && !OTHERS.contains(&name);
-        if let Some(key) = part.settings.keys().iter().find(|key| set(key.name)) {
+/// Fails for keys that `is_known` does not accept, by the part and the name of each. `advice` says what for they are none, and
+/// where they belong.
+fn check_keys(
+    description: &SceneDescription,
+    is_known: impl Fn(&Part<&dyn KeyedSettings>, &str) -> bool,
+    advice: &str,
+) -> Result<(), Invalid> {
+    for part in description.parts() {
+        let is_set = |name: &str| part.settings.get(name).is_some();
+        let unknown = |name: &str| is_set(name) && !is_known(&part, name);
+        if let Some(key) = part.settings.keys().iter().find(|key| unknown(key.name)) {
             let path = format!("{}{}", part.prefix, key.name);
-            return Err(Invalid::at(path, "is no key of preparation; give it to load or render"));
+            return Err(Invalid::at(path, format!("is no key of {advice}")));
         }
     }
     Ok(())

@@ -19,7 +19,6 @@ use surfel::description::{Invalid, is_scene_file};
 use surfel::live_scene::LiveScene;
 use surfel::live_view::LiveView;
 use surfel::overlay::faults;
-use surfel::progress_log::Choice;
 use surfel::ray_query::WHOLE_RAY;
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::{Image, NO_ID, class_color, class_name};
@@ -122,7 +121,7 @@ impl PyScene {
         Ok(Self::new(with_keys(py, &SceneDescription::default(), keys)?))
     }
 
-    /// Adds a `Cloud`, a `Mesh`, a file, or a cloud or mesh of another package, and returns its number, which the
+    /// Adds `geometry`, a `Cloud`, a `Mesh`, a file, or a cloud or mesh of another package, and returns its number, which the
     /// `geometry_ids` of rays have.
     ///
     /// `name`: for `parent` of others and for messages. `material`: a name as `mirror`, or a dict. `transform`: a 4x4 matrix to
@@ -130,17 +129,17 @@ impl PyScene {
     /// `translate`, `rotate`, `scale`, `color`, `surface`, `visible`.
     ///
     /// Raises `InvalidSetting`, `InvalidArray`, `MissingFile`.
-    #[pyo3(signature = (what, *, name = None, material = None, transform = None, **keys))]
+    #[pyo3(signature = (geometry, *, name = None, material = None, transform = None, **keys))]
     fn add(
         &self,
         py: Python<'_>,
-        what: &Bound<'_, PyAny>,
+        geometry: &Bound<'_, PyAny>,
         name: Option<&Bound<'_, PyAny>>,
         material: Option<&Bound<'_, PyAny>>,
         transform: Option<&Bound<'_, PyAny>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<usize> {
-        let object = NewObject::new(what, name, material, transform, keys)?;
+        let object = NewObject::new(geometry, name, material, transform, keys)?;
         loop {
             // No lock is held while the interpreter may run another thread, which could wait for it.
             let before = self.description();
@@ -241,8 +240,6 @@ impl PyScene {
             }
             let (image, _) = scene.picture(view, layers, progress)?;
             let ids = pixel_ids(view, &image);
-            let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
-            let choices = choices.iter().map(line).collect();
             Ok(PyImage::new(image, view.flat.origin, ids, choices))
         })
     }
@@ -293,7 +290,7 @@ impl PyScene {
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyImage> {
         let color = column::<f32>(&checked(py, "numbers", ("color", color, [None::<u8>; 3]))?)?;
-        self.with_view(py, keys, None, |_, ChosenView { view, .. }, _| {
+        self.with_view(py, keys, None, |_, ChosenView { view, choices, .. }, _| {
             let mut image = Image::new(view.settings.width, view.settings.height);
             let pixels = color.as_chunks::<4>().0;
             let expected = image.color.len();
@@ -310,7 +307,7 @@ impl PyScene {
                 (legend, _) => legend.clone(),
             };
             let image = view.finished_with(image, legend);
-            Ok(PyImage::new(image, view.flat.origin, PixelIds::default(), Vec::new()))
+            Ok(PyImage::new(image, view.flat.origin, PixelIds::default(), choices))
         })
     }
 

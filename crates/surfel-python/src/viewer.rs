@@ -12,17 +12,17 @@ use surfel_cli::{FrameAncestors, RunningViewer};
 /// A running viewer. It stops with `close()`, at the end of a `with` block, or with the interpreter.
 #[pyclass(frozen, module = "surfel", name = "Viewer")]
 pub struct PyViewer {
-    link: String,
+    url: String,
     frame_ancestors: FrameAncestors,
     running: Mutex<Option<RunningViewer>>,
 }
 
 #[pymethods]
 impl PyViewer {
-    /// The link to its page, on this machine.
+    /// The address of its page, on this machine.
     #[getter]
-    fn link(&self) -> &str {
-        &self.link
+    fn url(&self) -> &str {
+        &self.url
     }
 
     /// Stops the viewer. Raises `InvalidScene` if its files could not be read.
@@ -52,7 +52,7 @@ impl PyViewer {
 
     /// The link in a cell of a notebook.
     fn _repr_html_(&self) -> String {
-        format!("<a href=\"{0}\" target=\"_blank\">{0}</a>", self.link)
+        format!("<a href=\"{0}\" target=\"_blank\">{0}</a>", self.url)
     }
 
     /// The page in a cell of a notebook, where anywidget is installed, and the link.
@@ -65,7 +65,7 @@ impl PyViewer {
     }
 
     fn __repr__(&self) -> String {
-        format!("<surfel.Viewer {}>", self.link)
+        format!("<surfel.Viewer {}>", self.url)
     }
 }
 
@@ -87,9 +87,9 @@ pub fn view(
     description.check_is_not_empty().map_err(|error| invalid_setting(py, error))?;
     let running = work::detached(py, || RunningViewer::start(description, port))?
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
-    let (link, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());
+    let (url, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());
     if open {
-        py.import("webbrowser")?.call_method1("open", (&link,))?;
+        py.import("webbrowser")?.call_method1("open", (&url,))?;
     }
-    Ok(PyViewer { link, frame_ancestors, running: Mutex::new(Some(running)) })
+    Ok(PyViewer { url, frame_ancestors, running: Mutex::new(Some(running)) })
 }

@@ -1,17 +1,18 @@
-//! Work without the interpreter. Long work runs on a thread of its own, while the caller's thread reports progress and
-//! looks for Ctrl-C.
+//! Work without the interpreter. Long work runs on a thread of its own, while the caller's thread reports progress, notes
+//! and warnings, and looks for Ctrl-C.
 
 use crate::errors::{panicked, to_exception};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
-use surfel_core::progress::Progress;
+use surfel_core::progress::{Progress, with_keys};
 
 /// Time between two looks for Ctrl-C, and between two reports of progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -19,11 +20,13 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Bytes of the stack of the thread that works, as many as a program's main thread has.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Runs `work`. `callback` is called as `callback(stage, done, total)` on the caller's thread; `True` shows a bar.
+/// Runs `work`. `callback` is called as `callback(stage, done, total)` on the caller's thread; `True` shows a bar. There,
+/// too, warnings become a `UserWarning`, and notes and choices messages of the logger `surfel`.
 ///
 /// # Errors
 ///
-/// Fails as `work` does, with what `callback` raises, and with `KeyboardInterrupt` upon Ctrl-C.
+/// Fails as `work` does, with what `callback` raises, with warnings that are errors to the interpreter, and with
+/// `KeyboardInterrupt` upon Ctrl-C.
 pub fn run<T: Send>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
@@ -64,16 +67,19 @@ fn run_reporting<T: Send>(
             });
             match received {
                 Ok(Ok(result)) => {
-                    let result = result.map_err(|error| to_exception(py, &error));
-                    // Work that ends between two reports is reported, too.
-                    if raised.is_none() && result.is_ok() {
-                        listener.report(callback)?;
+                    if let Some(raised) = raised {
+                        return Err(raised);
                     }
-                    return raised.map_or(result, Err);
+                    // Work that ends between two reports is reported, too.
+                    let delivered = listener.deliver(py);
+                    let result = result.map_err(|error| to_exception(py, &error))?;
+                    delivered.and_then(|()| listener.report(callback))?;
+                    return Ok(result);
                 }
                 Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
                 Err(RecvTimeoutError::Timeout) if raised.is_none() => {
-                    raised = py.check_signals().and_then(|()| listener.report(callback)).err();
+                    let reported = py.check_signals().and_then(|()| listener.deliver(py));
+                    raised = reported.and_then(|()| listener.report(callback)).err();
                     listener.is_cancelled.store(raised.is_some(), Ordering::Relaxed);
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -112,6 +118,13 @@ struct Listener {
     is_cancelled: AtomicBool,
     stage: Mutex<(String, u64)>,
     n_done: AtomicU64,
+    /// Lines that the interpreter does not know yet.
+    messages: Mutex<Vec<Message>>,
+}
+
+enum Message {
+    Note(String),
+    Warning(String),
 }
 
 impl Listener {
@@ -123,6 +136,29 @@ impl Listener {
         }
         Ok(())
     }
+
+    /// Hands warnings to the module `warnings`, and notes to the module `logging`.
+    fn deliver(&self, py: Python<'_>) -> PyResult<()> {
+        let messages = std::mem::take(&mut *self.messages());
+        for message in messages {
+            match message {
+                Message::Note(line) => {
+                    let logger = py.import("logging")?.call_method1("getLogger", ("surfel",))?;
+                    logger.call_method1("info", (line,))?;
+                }
+                Message::Warning(line) => {
+                    // Names of columns may hold anything, but a C string ends at its first 0.
+                    let line = CString::new(line.replace('\0', " "))?;
+                    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn messages(&self) -> MutexGuard<'_, Vec<Message>> {
+        self.messages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Progress for Listener {
@@ -133,6 +169,14 @@ impl Progress for Listener {
 
     fn advance(&self, units: u64) {
         self.n_done.fetch_add(units, Ordering::Relaxed);
+    }
+
+    fn note(&self, line: &str) {
+        self.messages().push(Message::Note(line.to_owned()));
+    }
+
+    fn warning(&self, line: &str, keys: &[&str]) {
+        self.messages().push(Message::Warning(with_keys(line, keys)));
     }
 
     fn is_cancelled(&self) -> bool {

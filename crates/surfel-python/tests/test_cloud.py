@@ -213,8 +213,14 @@ def test_clouds_are_saved_and_read(points, tmp_path, extension):
     n = len(points)
     path = tmp_path / f"hill.{extension}"
     surfel.Cloud(points, scalars={"age": numpy.arange(n).astype("f4")}).save(path)
-    scene = surfel.load(path, color="age", resolution=(32, 24), spp=1, light_samples=1)
-    assert numpy.isfinite(scene.render().depth).any()
+    read = surfel.read_cloud(path)
+    # LAZ holds multiples of a step, text some digits.
+    assert numpy.allclose(read.points, points, atol=1e-3)
+    assert (read.scalars["age"] == numpy.arange(n)).all()
+    scene = surfel.load(path, color="age", light="none", resolution=(32, 24), spp=1)
+    image = scene.render()
+    hit = image.point_ids != 0xFFFFFFFF
+    assert hit.any() and len(numpy.unique(image.color[hit], axis=0)) > 10
 
 
 def test_clouds_cannot_be_saved_anyhow(points, tmp_path):
@@ -238,6 +244,59 @@ def test_meshes_of_arrays_are_refused_or_taken():
         surfel.Mesh([[0, 0, 0], [numpy.nan, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     with pytest.raises(surfel.InvalidArray, match="triangles: found none"):
         surfel.Mesh(corners)
+
+
+def test_meshes_have_the_arrays_that_they_were_made_of():
+    vertices = numpy.array([[691_000.25, 5_334_000.5, 7], [691_001, 5_334_000, 7], [691_000, 5_334_001, 9]])
+    colors = numpy.array([[0, 1, 257], [32768, 65535, 12345], [2, 3, 60000]], "u2")
+    mesh = surfel.Mesh(vertices, [[0, 1, 2], [2, 1, 0]], normals=[[0, 0, 2]] * 3, colors=colors)
+    assert numpy.allclose(mesh.vertices, vertices, atol=1e-4) and mesh.vertices.dtype == numpy.float64
+    assert mesh.triangles.tolist() == [[0, 1, 2], [2, 1, 0]] and mesh.triangles.dtype == numpy.uint32
+    assert mesh.normals.tolist() == [[0, 0, 1]] * 3 and not mesh.normals.flags.writeable
+    assert mesh.colors.dtype == numpy.uint16 and (mesh.colors == colors).all()
+    bare = surfel.Mesh(vertices, [[0, 1, 2]])
+    assert bare.normals is None and bare.colors is None
+
+
+def test_files_are_read_as_clouds(hill, points, tmp_path):
+    cloud = surfel.read_cloud(hill)
+    assert len(cloud) == 2500 and numpy.allclose(cloud.points, points, atol=1e-5)
+    assert cloud.normals is None and cloud.radii is None
+    high = surfel.read_cloud(hill, hill, filter="z > 0.2", threads=1)
+    assert len(high) == 2 * (points[:, 2] > 0.2).sum()
+    (tmp_path / "named.txt").write_text("1 2 3 4\n5 6 7 8\n")
+    named = surfel.read_cloud(tmp_path / "named.txt", columns="y,x,z,age")
+    assert named.points.tolist() == [[2, 1, 3], [6, 5, 7]] and named.scalars["age"].tolist() == [4, 8]
+    cut = tmp_path / "cut.ply"
+    surfel.Cloud(points).save(cut)
+    cut.write_bytes(cut.read_bytes()[:-100])
+    with pytest.raises(surfel.InvalidFile, match=r"\[salvage\]$"):
+        surfel.read_cloud(cut)
+    assert 2400 < len(surfel.read_cloud(cut, salvage=True)) < 2500
+
+
+@pytest.mark.parametrize(
+    ("keys", "error", "words"),
+    [
+        ({"radius": "0.1"}, surfel.InvalidSetting, "radius: is no key of reading; give it to prepare or load"),
+        ({"surface": "disc"}, surfel.InvalidSetting, "surface: is no key of reading"),
+        ({"filter": "z > 9"}, surfel.InvalidScene, "no point meets z > 9"),
+        ({"memory_limit": 1000}, surfel.OutOfMemory, r"\[memory_limit\]$"),
+    ],
+)
+def test_files_are_not_read_by_other_keys(hill, keys, error, words):
+    with pytest.raises(error, match=words):
+        surfel.read_cloud(hill, **keys)
+
+
+def test_clouds_are_not_made_of_paths(hill):
+    for path in ("a.laz", hill):
+        with pytest.raises(surfel.InvalidArray, match="surfel.read_cloud reads files"):
+            surfel.Cloud(path)
+    with pytest.raises(surfel.MissingFile):
+        surfel.read_cloud("nowhere.laz")
+    with pytest.raises(surfel.Error, match="no input file"):
+        surfel.read_cloud()
 
 
 def test_buffers_of_the_standard_library_are_arrays():

@@ -38,11 +38,13 @@ def test_threads_share_a_scene(hill):
 def test_a_scene_grows_while_another_thread_renders(points):
     scene = surfel.Scene(**SMALL)
     scene.add(surfel.Cloud(points))
-    thread = threading.Thread(target=lambda: [scene.render() for _ in range(5)])
+    images = []
+    thread = threading.Thread(target=lambda: [images.append(scene.render()) for _ in range(5)])
     thread.start()
     for i in range(1, 5):
         assert scene.add(surfel.Cloud(points), translate=(3 * i, 0, 0)) == i
     thread.join()
+    assert len(images) == 5 and all(image.coverage.any() for image in images)
     assert scene.cast_rays([[12, 0, 9, 0, 0, -1]])["geometry_ids"].tolist() == [4]
 
 
@@ -254,11 +256,13 @@ def test_spawned_processes_render():
 def test_threads_share_a_scene_with_threads_of_its_own():
     scene = surfel.Scene(threads=2, **SMALL)
     scene.add(surfel.Cloud(hill_points(150)))
-    work = lambda i: [scene.render(normals_k=8 + i + 4 * k) for k in range(3)]
+    images = []
+    work = lambda i: [images.append(scene.render(normals_k=8 + i + 4 * k)) for k in range(3)]
     threads = [threading.Thread(target=work, args=(i,), daemon=True) for i in range(3)]
     [thread.start() for thread in threads]
     [thread.join(120) for thread in threads]
     assert not any(thread.is_alive() for thread in threads)
+    assert len(images) == 9 and all(image.coverage.any() for image in images)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="threads as Linux lists them")
@@ -280,6 +284,6 @@ print(n_threads() - before)
     assert program.stdout == "3\n", program.stderr
 
 
-def test_a_scene_has_its_own_number_of_threads(hill):
+def test_pictures_are_the_same_on_any_number_of_threads(hill):
     one, two = (surfel.load(hill, threads=n).render(**SMALL).color for n in (1, 2))
     assert (one == two).all()

@@ -27,7 +27,7 @@ def viewer(points):
 
 def policy(viewer):
     """The pages that may frame the viewer, as its page says."""
-    with urllib.request.urlopen(viewer.link, timeout=30) as answer:
+    with urllib.request.urlopen(viewer.url, timeout=30) as answer:
         return answer.headers["content-security-policy"].split("frame-ancestors ")[1]
 
 
@@ -48,7 +48,7 @@ def test_the_widget_allows_the_notebook_that_shows_it(viewer):
     from surfel._widget import _widget_class
 
     widget = _widget_class(anywidget, traitlets)(viewer)
-    assert widget.link == viewer.link and widget.allowed == "" and policy(viewer) == "'none'"
+    assert widget.link == viewer.url and widget.allowed == "" and policy(viewer) == "'none'"
     # What the front end sends.
     widget.set_state({"origin": "http://127.0.0.1:8888"})
     assert widget.allowed == "http://127.0.0.1:8888" == policy(viewer)
@@ -59,7 +59,7 @@ def test_the_widget_allows_the_notebook_that_shows_it(viewer):
 
 def test_without_anywidget_a_link_is_shown(viewer, monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    assert viewer.link in viewer._repr_mimebundle_(include=None, exclude=None)["text/html"]
+    assert viewer.url in viewer._repr_mimebundle_(include=None, exclude=None)["text/html"]
 
 
 def browser_environment():

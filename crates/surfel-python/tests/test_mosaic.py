@@ -1,19 +1,20 @@
 """Plans of survey tiles: what is put together from tiles with rims is the plan of the whole."""
 
 import functools
-import io
-import struct
-import zlib
 
 import numpy
 import pytest
 import surfel
+from conftest import pixels_of_png, tags_of_tiff
 
 dask = pytest.importorskip("dask")
 from surfel.dask import Recipe, render_mosaic  # noqa: E402
 from surfel.dask._mosaic import Layout, _survey  # noqa: E402
 
 ORIGIN = numpy.array([691_000.013, 5_334_000.017, 500.0])
+IMAGE_LENGTH, MODEL_PIXEL_SCALE, MODEL_TIEPOINT, GEO_KEYS = 257, 33550, 33922, 34735
+#: Key of the projected coordinate system among those of GeoTIFF.
+PROJECTED_SYSTEM = 3072
 KEYS = {"gsd": 0.25, "spp": 1, "light_samples": 4}
 
 
@@ -37,35 +38,6 @@ def survey(tmp_path_factory):
         tiles.append(folder / f"tile_{i}.xyz")
         numpy.savetxt(tiles[-1], points[own], fmt="%.3f")
     return tuple(tiles)
-
-
-def pixels_of_png(data):
-    """Samples of an 8-bit PNG, (height, width, channels)."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    stream, chunks, header = io.BytesIO(data[8:]), b"", None
-    while head := stream.read(8):
-        size, kind = struct.unpack(">I4s", head)
-        content = stream.read(size)
-        stream.read(4)
-        if kind == b"IHDR":
-            header = struct.unpack(">IIBBBBB", content)
-        chunks += content if kind == b"IDAT" else b""
-    width, height, depth, color = header[:4]
-    assert depth == 8
-    return unfiltered(zlib.decompress(chunks), width, height, {0: 1, 2: 3, 4: 2, 6: 4}[color])
-
-
-def unfiltered(data, width, height, n):
-    rows, before = [], bytes(width * n)
-    for y in range(height):
-        kind, *line = data[y * (width * n + 1) : (y + 1) * (width * n + 1)]
-        for i in range(width * n):
-            left, up, corner = (line[i - n], before[i], before[i - n]) if i >= n else (0, before[i], 0)
-            nearest = min((left, up, corner), key=lambda value: abs(left + up - corner - value))
-            line[i] = (line[i] + (0, left, up, (left + up) // 2, nearest)[kind]) & 255
-        rows.append(line)
-        before = line
-    return numpy.array(rows, numpy.uint8).reshape(height, width, n)
 
 
 @functools.lru_cache
@@ -168,8 +140,14 @@ def test_places_without_tiles_are_background(survey, tmp_path):
 
 def test_mosaics_are_geotiffs(survey):
     data = render_mosaic([Recipe(tile, **KEYS, crs="EPSG:25832") for tile in survey[:2]], format="tif").compute()
-    # ModelPixelScale and ModelTiepoint say where the picture lies.
-    assert data[:4] == b"II*\0" and all(struct.pack("<H", tag) in data for tag in (33550, 33922))
+    tags = tags_of_tiff(data)
+    assert tags[MODEL_PIXEL_SCALE][:2] == (0.25, 0.25)
+    *pixel, x, y, _ = tags[MODEL_TIEPOINT]
+    assert pixel == [0, 0, 0] and (x % 0.25, y % 0.25) == (0, 0)
+    assert abs(x - ORIGIN[0]) < 1 and abs(y - tags[IMAGE_LENGTH][0] * 0.25 - ORIGIN[1]) < 1
+    directory = tags[GEO_KEYS]
+    geo_keys = {directory[i]: directory[i + 3] for i in range(4, len(directory), 4)}
+    assert geo_keys[PROJECTED_SYSTEM] == 25832
 
 
 @pytest.mark.parametrize(

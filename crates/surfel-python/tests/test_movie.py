@@ -41,6 +41,30 @@ def test_clouds_of_arrays_turn(points, tmp_path):
     assert reports
 
 
+def test_interrupted_movies_are_continued(hill, tmp_path):
+    # Large enough that the work is stopped before its end.
+    scene = surfel.load(hill, turntable=1, resolution=(160, 120), spp=4, light_samples=4)
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    whole.mkdir()
+    cut.mkdir()
+    surfel.animate(scene, whole / "f_##.png", frames=30)
+
+    def stop(*_):
+        if len(list(cut.glob("f_*.png"))) >= 2:
+            raise RuntimeError("stopped")
+
+    with pytest.raises(RuntimeError, match="stopped"):
+        surfel.animate(scene, cut / "f_##.png", frames=30, progress=stop)
+    kept = {file: file.stat().st_mtime_ns for file in cut.glob("f_*.png")}
+    assert 2 <= len(kept) < 30
+    with pytest.raises(surfel.InvalidFile, match=r"\[resume\]$"):
+        surfel.animate(scene, cut / "f_##.png", frames=30, resume=True, spp=2)
+    surfel.animate(scene, cut / "f_##.png", frames=30, resume=True)
+    assert all(file.stat().st_mtime_ns == time for file, time in kept.items())
+    for i in range(1, 31):
+        assert (cut / f"f_{i:02}.png").read_bytes() == (whole / f"f_{i:02}.png").read_bytes(), i
+
+
 @pytest.mark.parametrize("frames", [range(2, 5), range(0, 6, 2), "many", -1, 0])
 def test_other_frames_are_refused(hill, tmp_path, frames):
     with pytest.raises(surfel.InvalidSetting, match="frames: found"):

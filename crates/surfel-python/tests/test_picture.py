@@ -2,10 +2,12 @@
 
 import subprocess
 import sys
+import warnings
 
 import numpy
 import pytest
 import surfel
+from conftest import pixels_of_png
 
 SMALL = {"resolution": (64, 48), "spp": 1, "light_samples": 2}
 
@@ -122,8 +124,62 @@ def test_keywords_of_a_picture_do_not_stay(hill):
     assert (before.color == again.color).all() and (before.color != other.color).any()
 
 
+def test_display_colours_are_those_of_the_png(hill):
+    image = surfel.load(hill).render(background="transparent", **SMALL)
+    pixels = pixels_of_png(image._repr_png_())
+    covered = image.srgb[..., 3] > 0
+    assert covered.any() and not covered.all()
+    assert (image.srgb[..., 3] == pixels[..., 3]).all()
+    assert (image.srgb[covered] == pixels[covered]).all()
+
+
 def test_choices_name_their_keys(image):
     assert any("camera" in choice and "[camera.position" in choice for choice in image.choices)
+
+
+def test_pictures_of_what_is_known_list_the_same_choices(hill):
+    scene = surfel.load(hill)
+    first = scene.render(**SMALL).choices
+    assert any("columns taken as" in choice and choice.endswith("[columns]") for choice in first)
+    assert any("[radius" in choice for choice in first) and any("normals" in choice for choice in first)
+    assert len(first) == len(set(first))
+    turned = scene.render(camera_azimuth_angle=120, **SMALL).choices
+    # The sun stands beside the camera, and lights what it shows.
+    follows_camera = lambda choice: any(key in choice for key in ("[camera", "[sun", "[exposure"))
+    others = [[choice for choice in choices if not follows_camera(choice)] for choices in (first, turned)]
+    assert len(others[0]) >= 4 and others[0] == others[1]
+    assert scene.render(**SMALL).choices == first
+    # Files whose settings group them otherwise are read again, once.
+    keys = {"object_settings": ["hill.xyz:color=#ff0000"], **SMALL}
+    other = scene.render(**keys).choices
+    scene.render(**SMALL)
+    assert scene.render(**keys).choices == other and any("[columns]" in choice for choice in other)
+    films = surfel.Film(scene, frames=2, turntable=1, **SMALL)
+    assert any("[columns]" in choice for choice in films.render(0).choices)
+
+
+def test_warnings_of_all_calls_reach_the_module_warnings(hill):
+    with pytest.warns(UserWarning, match=r"only for the surface cylinder.*\[reach, surface\]$"):
+        scene = surfel.load(hill, reach=3)
+    place = {"place": (48.1, 11.6), "light": "sun,sky"}
+    with pytest.warns(UserWarning, match="below the horizon: it gives no light") as caught:
+        scene.render(sun="2026-06-21T00:00:00Z", **place, **SMALL)
+    assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene.render(sun="2026-06-21T12:00:00Z", **place, **SMALL)
+        with pytest.raises(UserWarning, match="below the horizon"):
+            scene.render(sun="2026-06-21T00:10:00Z", **place, **SMALL)
+
+
+def test_notes_and_choices_are_logged(hill, caplog):
+    with caplog.at_level("INFO", logger="surfel"):
+        scene = surfel.load(hill)
+        scene.render(**SMALL)
+    lines = [record.getMessage() for record in caplog.records if record.name == "surfel"]
+    assert any("2500 points, text" in line for line in lines)
+    assert any("columns taken as x y z" in line for line in lines)
+    assert any("[camera.position" in line for line in lines)
 
 
 def test_a_scene_file_is_a_scene(hill, tmp_path):

@@ -63,6 +63,30 @@ def test_degrees_are_moved_on_request_and_warned_of_otherwise():
     assert (moved.points[:, 1] > 5e6).all()
 
 
+def test_sources_are_moved_to_metres_before_they_become_one(tmp_path):
+    angles = numpy.arange(900)
+    degrees = numpy.stack([11.57 + 1e-4 * (angles % 30), 48.13 + 1e-4 * (angles // 30), angles % 17], axis=1)
+    moved = surfel.prepare(surfel.Cloud(degrees), duplicates="keep", reproject=True)
+    numpy.savetxt(tmp_path / "degrees.xyz", degrees, fmt="%.9f")
+    for other in (surfel.Cloud(degrees), tmp_path / "degrees.xyz"):
+        both = surfel.prepare(moved, other, duplicates="keep", reproject=True)
+        assert both.crs == "EPSG:32632"
+        assert numpy.allclose(both.points[:900], both.points[900:], atol=0.01)
+
+
+def test_coordinate_systems_that_differ_are_warned_of(points):
+    clouds = [surfel.Cloud(points, crs=crs) for crs in (25832, 25833)]
+    with pytest.warns(UserWarning, match="cloud 1: its coordinate system differs from that of cloud 0"):
+        surfel.prepare(*clouds, duplicates="keep")
+
+
+def test_clouds_count_against_the_memory_limit(hill, points):
+    for sources in ((points,), (hill, points)):
+        with pytest.raises(surfel.OutOfMemory, match=r"\[memory_limit\]$"):
+            surfel.prepare(*sources, memory_limit=10_000)
+    assert len(surfel.prepare(points, memory_limit="1G")) == 2500
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [

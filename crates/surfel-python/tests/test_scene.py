@@ -93,12 +93,20 @@ def test_all_files_together_have_one_number(hill, tmp_path):
     assert hits["geometry_ids"].tolist() == [0, 0, 1]
 
 
-def test_materials_are_those_of_scene_files(points):
+def test_materials_are_those_of_scene_files(hill, tmp_path):
+    camera = {"camera_position": (0, -4, 3), "camera_focal_point": (0, 0, 0)}
+    written = {
+        "": None,
+        'material = "mirror"': "mirror",
+        'material = { kind = "plastic", roughness = 0.2 }': {"kind": "plastic", "roughness": 0.2},
+    }
     pictures = []
-    for material in (None, "mirror", {"kind": "plastic", "roughness": 0.2}):
-        scene = surfel.Scene(camera_position=(0, -4, 3), camera_focal_point=(0, 0, 0), **SMALL)
-        scene.add(surfel.Cloud(points), material=material)
+    for line, material in written.items():
+        scene = surfel.Scene(**camera, **SMALL)
+        scene.add(hill, material=material)
         pictures.append(scene.render().color)
+        (tmp_path / "scene.toml").write_text(f'[[object]]\nfile = "{hill.as_posix()}"\n{line}\n')
+        assert (pictures[-1] == surfel.load(tmp_path / "scene.toml", **camera, **SMALL).render().color).all()
     assert (pictures[0] != pictures[1]).any() and (pictures[0] != pictures[2]).any()
 
 
@@ -121,7 +129,7 @@ def test_filters_keep_the_ids_of_the_array(points):
 
 
 @pytest.mark.parametrize(
-    ("what", "keywords", "error", "words"),
+    ("geometry", "keywords", "error", "words"),
     [
         (SQUARE, {"trnslate": (1, 2, 3)}, surfel.InvalidSetting, "^trnslate: unknown key; the nearest known one is `translate`"),
         (SQUARE, {"translate": "far"}, surfel.InvalidSetting, "^translate: found"),
@@ -137,10 +145,10 @@ def test_filters_keep_the_ids_of_the_array(points):
         (object(), {}, surfel.InvalidArray, "points: found"),
     ],
 )
-def test_what_cannot_be_added_changes_nothing(what, keywords, error, words):
+def test_what_cannot_be_added_changes_nothing(geometry, keywords, error, words):
     scene = surfel.Scene()
     with pytest.raises(error, match=words):
-        scene.add(what, **keywords)
+        scene.add(geometry=geometry, **keywords)
     assert repr(scene) == "<surfel.Scene of 0 files and 0 objects>"
 
 

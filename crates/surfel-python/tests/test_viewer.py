@@ -8,8 +8,8 @@ import pytest
 import surfel
 
 
-def fetch(link):
-    with urllib.request.urlopen(link, timeout=30) as answer:
+def fetch(url):
+    with urllib.request.urlopen(url, timeout=30) as answer:
         return answer.read()
 
 
@@ -17,11 +17,11 @@ def test_the_page_is_there_until_the_viewer_is_closed(points):
     scene = surfel.Scene()
     scene.add(surfel.Cloud(points), name="hill")
     with surfel.view(scene) as viewer, surfel.view(scene) as other:
-        assert viewer.link.startswith("http://127.0.0.1:") and viewer.link != other.link
-        assert b"<!doctype html>" in fetch(viewer.link).lower()
-        assert viewer.link in viewer._repr_html_() and viewer.link in repr(viewer)
+        assert viewer.url.startswith("http://127.0.0.1:") and viewer.url != other.url
+        assert b"<!doctype html>" in fetch(viewer.url).lower()
+        assert viewer.url in viewer._repr_html_() and viewer.url in repr(viewer)
     with pytest.raises(OSError):
-        fetch(viewer.link)
+        fetch(viewer.url)
     viewer.close()
 
 
@@ -29,22 +29,22 @@ def test_programs_get_pictures_of_clouds_of_arrays(points):
     scene = surfel.Scene()
     scene.add(surfel.Cloud(points))
     with surfel.view(scene) as viewer:
-        while b"ready" not in fetch(viewer.link + "healthz"):
+        while b"ready" not in fetch(viewer.url + "healthz"):
             time.sleep(0.05)
-        picture = fetch(viewer.link + "render?resolution=32x24&spp=1&light-samples=1")
+        picture = fetch(viewer.url + "render?resolution=32x24&spp=1&light-samples=1")
         assert picture.startswith(b"\x89PNG")
 
 
 def test_the_number_of_threads_of_a_scene_holds_for_its_viewer(hill):
     with surfel.view(surfel.load(hill, threads=3)) as viewer:
-        while b"ready" not in fetch(viewer.link + "healthz"):
+        while b"ready" not in fetch(viewer.url + "healthz"):
             time.sleep(0.05)
-        assert json.loads(fetch(viewer.link + "stats"))["info"]["threads"] == 3
+        assert json.loads(fetch(viewer.url + "stats"))["info"]["threads"] == 3
 
 
 def test_ports_in_use_are_refused(hill):
     scene = surfel.load(hill)
     with surfel.view(scene) as viewer:
-        port = int(viewer.link.rsplit(":", 1)[1].strip("/"))
+        port = int(viewer.url.rsplit(":", 1)[1].strip("/"))
         with pytest.raises(surfel.Error, match=str(port)):
             surfel.view(scene, port=port)

@@ -11,7 +11,10 @@ fn main() -> surfel::Result<()> {
     };
     let scene = surfel::load(input)?;
     for choice in scene.choices() {
-        println!("{} [{}]", choice.reason, choice.keys.join(", "));
+        println!("{choice}");
+    }
+    for warning in scene.warnings() {
+        println!("warning: {warning}");
     }
     scene.render()?.save(output)
 }

@@ -5,7 +5,7 @@ use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
 use crate::picture::RenderedImage;
-use crate::progress_log::{CancelOnly, Choice, ProgressLog};
+use crate::progress_log::{CancelOnly, Choice, ProgressLog, Warning};
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
     Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps, expose_materials,
@@ -41,6 +41,7 @@ pub struct BuiltScene {
     pub settings: Settings,
     description: SceneDescription,
     choices: Vec<Choice>,
+    warnings: Vec<Warning>,
     /// For each geometry, the index that each point had when it was read; empty where none is kept.
     source_indices: Vec<Vec<u32>>,
 }
@@ -63,8 +64,8 @@ impl Resolved {
     ///
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
-        let Self { scene, settings, description, choices, sequences, .. } = self;
-        let Self { camera, turned_room, overlay, system, up, .. } = self;
+        let Self { scene, settings, description, choices, warnings, .. } = self;
+        let Self { sequences, camera, turned_room, overlay, system, up, .. } = self;
         let renderer = SceneRenderer::new(&description.run)?;
         let mut flat = FlatScene::new(&scene, progress)?;
         flat.camera_planes = planes_before(turned_room.as_ref(), &flat.camera);
@@ -89,6 +90,7 @@ impl Resolved {
             settings,
             description,
             choices,
+            warnings,
             source_indices,
         })
     }
@@ -170,6 +172,11 @@ impl BuiltScene {
     /// Returns what was chosen from the data, in the order of the work.
     pub fn choices(&self) -> &[Choice] {
         &self.choices
+    }
+
+    /// Returns hints at what is probably not meant, in the order of the work.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 
     /// Returns the SIMD level of the kernels.

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::locks::lock_unless_cancelled;
+use crate::progress_log::{Choice, ProgressLog};
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,7 +17,15 @@ pub struct Lru2<T> {
     making: Mutex<()>,
 }
 
-type Entries<T> = VecDeque<(u64, Arc<T>)>;
+type Entries<T> = VecDeque<Entry<T>>;
+
+#[derive(Debug)]
+struct Entry<T> {
+    key: u64,
+    value: Arc<T>,
+    /// The choices that were made along with the result.
+    choices: Arc<[Choice]>,
+}
 
 const CAPACITY: usize = 2;
 
@@ -28,25 +37,27 @@ impl<T> Default for Lru2<T> {
 
 impl<T> Lru2<T> {
     /// Returns the result for `key`, made now unless it is known. One result is made at a time: several callers that
-    /// want the same wait for one of them.
+    /// want the same wait for one of them. Each caller hears of the choices that were made with it.
     pub fn get_or_make(
         &self,
         key: u64,
         progress: &dyn Progress,
-        make: impl FnOnce() -> Result<T>,
+        make: impl FnOnce(&dyn Progress) -> Result<T>,
     ) -> Result<Arc<T>> {
-        if let Some(known) = self.find(key) {
+        if let Some(known) = self.find(key, progress) {
             return Ok(known);
         }
         let _making = lock_unless_cancelled(&self.making, progress)?;
         // Another caller may have made it in the meantime.
-        if let Some(known) = self.find(key) {
+        if let Some(known) = self.find(key, progress) {
             return Ok(known);
         }
         // Before the new one takes as much memory.
         self.drop_oldest();
-        let value = Arc::new(make()?);
-        self.entries().push_back((key, value.clone()));
+        let log = ProgressLog::new(progress);
+        let value = Arc::new(make(&log)?);
+        let choices = log.into_records().choices.into();
+        self.entries().push_back(Entry { key, value: value.clone(), choices });
         Ok(value)
     }
 
@@ -58,16 +69,19 @@ impl<T> Lru2<T> {
 
     /// Returns true if the result for `key` is known.
     pub fn contains(&self, key: u64) -> bool {
-        self.entries().iter().any(|(known, _)| *known == key)
+        self.entries().iter().any(|entry| entry.key == key)
     }
 
-    /// Returns the result for `key` if it is known, which is the latest then.
-    fn find(&self, key: u64) -> Option<Arc<T>> {
+    /// Returns the result for `key` if it is known, which is the latest then, and reports its choices.
+    fn find(&self, key: u64, progress: &dyn Progress) -> Option<Arc<T>> {
         let mut entries = self.entries();
-        let i = entries.iter().position(|(known, _)| *known == key)?;
+        let i = entries.iter().position(|entry| entry.key == key)?;
         let found = entries.remove(i)?;
-        entries.push_back(found.clone());
-        Some(found.1)
+        let (value, choices) = (found.value.clone(), found.choices.clone());
+        entries.push_back(found);
+        drop(entries);
+        choices.iter().for_each(|choice| choice.report(progress));
+        Some(value)
     }
 
     /// Drops the oldest results, so that another fits.
@@ -114,7 +128,7 @@ mod tests {
     fn the_last_two_results_are_kept() {
         let (cache, mut n_computed) = (Lru2::default(), 0);
         for key in [1, 2, 1, 2, 3, 2, 1] {
-            let value = cache.get_or_make(key, &NoProgress, || {
+            let value = cache.get_or_make(key, &NoProgress, |_| {
                 n_computed += 1;
                 Ok(key)
             });
@@ -129,15 +143,39 @@ mod tests {
     #[test]
     fn known_results_are_returned_while_another_is_made() {
         let cache = Lru2::<i32>::default();
-        cache.get_or_make(1, &NoProgress, || Ok(10)).unwrap();
-        let value = cache.get_or_make(2, &NoProgress, || {
+        cache.get_or_make(1, &NoProgress, |_| Ok(10)).unwrap();
+        let value = cache.get_or_make(2, &NoProgress, |_| {
             assert!(cache.contains(1) && !cache.contains(2));
             // A cancelled caller does not wait.
-            assert!(cache.get_or_make(3, &Cancelled, || Ok(30)).is_err());
-            Ok(2 * *cache.get_or_make(1, &Cancelled, || Ok(11))?)
+            assert!(cache.get_or_make(3, &Cancelled, |_| Ok(30)).is_err());
+            Ok(2 * *cache.get_or_make(1, &Cancelled, |_| Ok(11))?)
         });
         assert_eq!(*value.unwrap(), 20);
         assert!(cache.contains(1) && cache.contains(2));
+    }
+
+    #[test]
+    fn known_results_come_with_the_choices_that_were_made_with_them() {
+        let (inner, outer) = (Lru2::<i32>::default(), Lru2::<i32>::default());
+        let choices = |key: u64| {
+            let log = ProgressLog::new(&NoProgress);
+            let make_inner = |progress: &dyn Progress| {
+                progress.choice("radii of 12 neighbours", &["radius"]);
+                Ok(1)
+            };
+            let make_outer = |progress: &dyn Progress| {
+                let inner = inner.get_or_make(1, progress, make_inner)?;
+                progress.choice(&format!("tree {key}"), &[]);
+                Ok(*inner)
+            };
+            outer.get_or_make(key, &log, make_outer).unwrap();
+            let choices = log.into_records().choices.into_iter();
+            choices.map(|choice| choice.to_string()).collect::<Vec<_>>()
+        };
+        for key in [1, 1, 2, 2, 1] {
+            let expected = ["radii of 12 neighbours [radius]".to_owned(), format!("tree {key}")];
+            assert_eq!(choices(key), expected);
+        }
     }
 
     #[test]
@@ -146,7 +184,7 @@ mod tests {
         let (n_computed, start) = (AtomicUsize::new(0), Barrier::new(2));
         let call = || {
             start.wait();
-            let value = cache.get_or_make(1, &NoProgress, || {
+            let value = cache.get_or_make(1, &NoProgress, |_| {
                 std::thread::sleep(Duration::from_millis(20));
                 Ok(n_computed.fetch_add(1, Ordering::Relaxed))
             });

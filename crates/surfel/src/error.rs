@@ -40,10 +40,10 @@ pub enum Error {
         filter: String,
     },
     /// The system denies threads.
-    #[error("the threads cannot be started; ask for fewer with `threads`: {0}")]
+    #[error("the threads cannot be started; ask for fewer [threads]: {0}")]
     Threads(String),
     /// A movie was not finished.
-    #[error("{cause}; {} kept, continue from there with --resume", frames(*n_done, *n_frames))]
+    #[error("{cause}; {} kept, continue from there [resume]", frames(*n_done, *n_frames))]
     Unfinished {
         /// The reason.
         cause: Box<Error>,

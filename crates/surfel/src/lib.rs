@@ -45,7 +45,7 @@
 //!
 //! let scene = resolve(&description, &NoProgress)?.build(&NoProgress)?;
 //! for choice in scene.choices() {
-//!     println!("{} [{}]", choice.reason, choice.keys.join(", "));
+//!     println!("{choice}");
 //! }
 //! let image = scene.render()?;
 //! assert_eq!(image.coverage[24 * 64 + 32], 1.0);
@@ -89,7 +89,7 @@ pub use built_scene::BuiltScene;
 pub use description::SceneDescription;
 pub use error::{Error, Result};
 pub use picture::RenderedImage;
-pub use progress_log::Choice;
+pub use progress_log::{Choice, Warning};
 pub use ray_query::RayHit;
 pub use renderer::SceneRenderer;
 pub use resolve::{Resolved, resolve};

@@ -165,7 +165,7 @@ impl LiveScene {
         if first == description.objects.len() {
             return self.regrouped_for(description, progress);
         }
-        self.extended.get_or_make(grouping_key(description), progress, || {
+        self.extended.get_or_make(grouping_key(description), progress, |progress| {
             let base = self.regrouped_for(&without_added(description, first), progress)?;
             base.with_further_objects(description, progress)
         })
@@ -180,7 +180,7 @@ impl LiveScene {
         if key == grouping_key(&self.startup) {
             return Ok(self.loaded.clone());
         }
-        self.regrouped.get_or_make(key, progress, || {
+        self.regrouped.get_or_make(key, progress, |progress| {
             let startup = SceneDescription {
                 objects_default: self.startup.objects_default.clone(),
                 picture: self.startup.picture.clone(),
@@ -201,10 +201,18 @@ impl LiveScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<(Arc<LoadedScene>, AutoSettings)> {
-        let loaded = self.loaded_for(description, progress)?;
+        self.choose_of(self.loaded_for(description, progress)?, description, progress)
+    }
+
+    fn choose_of(
+        &self,
+        loaded: Arc<LoadedScene>,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<(Arc<LoadedScene>, AutoSettings)> {
         let kept = match loaded.has_more_than(description) {
             false => loaded,
-            true => self.filtered.get_or_make(filter_key(description), progress, || {
+            true => self.filtered.get_or_make(filter_key(description), progress, |progress| {
                 loaded.filtered(description, progress)
             })?,
         };
@@ -266,7 +274,7 @@ impl LiveScene {
         progress: &dyn Progress,
     ) -> Result<LiveView> {
         let loaded = self.loaded_for(description, progress)?;
-        let (kept, mut auto) = self.choose(description, progress)?;
+        let (kept, mut auto) = self.choose_of(loaded.clone(), description, progress)?;
         let description = &auto.with_color(description);
         if self.use_case == UseCase::Viewers {
             let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
@@ -279,11 +287,13 @@ impl LiveScene {
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
-        let (_, metered) = self.flat_at(cache, &kept, metered_at, description, &auto, progress)?;
-        let meter = || exposure_stops(exposure, &self.renderer, &metered, &settings, progress);
+        let at = |secs| self.flat_at(cache, &kept, secs, description, &auto, progress);
+        let (mut trees, mut flat) = at(metered_at)?;
+        let meter = || exposure_stops(exposure, &self.renderer, &flat, &settings, progress);
         let stops = self.preparation_threads.install(meter)?;
-        let (trees, mut flat) =
-            self.flat_at(cache, &kept, time_secs, description, &auto, progress)?;
+        if metered_at != time_secs {
+            (trees, flat) = at(time_secs)?;
+        }
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
         let moves_camera = auto.moves_camera(&kept);
@@ -392,7 +402,7 @@ impl LiveScene {
         let preparation = preparation_key(description);
         let frames = loaded.sequence_frames_at(time_secs);
         let trees = tree_key(description, preparation, auto, &frames);
-        cache.trees.get_or_make(trees, progress, || {
+        cache.trees.get_or_make(trees, progress, |progress| {
             let clouds = self.prepared(cache, loaded, description, progress)?;
             let source =
                 TreeSource { loaded, time_secs, description, auto, use_case: self.use_case };
@@ -411,16 +421,21 @@ impl LiveScene {
     ) -> Result<Vec<PreparedCloud>> {
         let (first, n_objects) =
             (first_added(description, &self.startup), description.objects.len());
-        let prepare = |added: bool| {
+        let prepare = |added: bool, progress: &dyn Progress| {
             let is_meant =
                 |object: Option<usize>| object.is_some_and(|object| first <= object) == added;
             self.preparation_threads.install(|| loaded.prepared(description, is_meant, progress))
         };
         let base = preparation_key(&without_added(description, first));
-        let mut clouds = cache.prepared.get_or_make(base, progress, || prepare(false))?.to_vec();
+        let mut clouds = cache
+            .prepared
+            .get_or_make(base, progress, |progress| prepare(false, progress))?
+            .to_vec();
         if first < n_objects {
             let key = preparation_key(description);
-            let added = cache.prepared_added.get_or_make(key, progress, || prepare(true))?;
+            let added = cache
+                .prepared_added
+                .get_or_make(key, progress, |progress| prepare(true, progress))?;
             clouds.extend_from_slice(&added);
         }
         Ok(clouds)

@@ -29,7 +29,7 @@ impl GpuRenderer {
     /// Fails, as there is no support of GPUs.
     pub fn open(_: Option<&str>) -> surfel_core::Result<Self> {
         let reason =
-            "this build has no GPU support; use --backend cpu, or build with the feature gpu";
+            "this build has no GPU support; use the CPU, or build with the feature gpu [backend]";
         Err(surfel_core::Error::Renderer(reason.into()))
     }
 

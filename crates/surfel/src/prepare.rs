@@ -1,6 +1,6 @@
-//! Clouds that are prepared and kept, rather than rendered.
+//! Clouds that are read or prepared and kept, rather than rendered.
 
-use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
+use crate::crs::{move_to_metres, report_degrees};
 use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
@@ -10,6 +10,7 @@ use crate::resolve::{
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DAffine3;
+use std::sync::Arc;
 use surfel_core::points::{
     Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, STRUCTURE,
     StructureChoice, denoise, prepare, select_points,
@@ -40,113 +41,145 @@ impl Columns {
     }
 }
 
-/// Reads files as one cloud and prepares it by the settings of a description for everything.
+/// Points that are read or prepared.
+#[derive(Clone, Debug)]
+pub enum PointSource {
+    /// The points of a file.
+    File(PathBuf),
+    /// A cloud in memory, and what is known about the file that it came from.
+    Cloud(Arc<PointCloud>, Box<FileInfo>),
+}
+
+impl PointSource {
+    /// Returns the name of the source in messages: its path, or its number among all.
+    fn name(&self, index: usize) -> PathBuf {
+        match self {
+            Self::File(file) => file.clone(),
+            Self::Cloud(..) => PathBuf::from(format!("cloud {index}")),
+        }
+    }
+
+    /// Returns what is known about the points before they are read.
+    fn inspect(&self) -> surfel_formats::Result<FileInfo> {
+        match self {
+            Self::File(file) => surfel_formats::inspect(file),
+            Self::Cloud(cloud, info) => {
+                Ok(FileInfo { n_points: Some(cloud.len() as u64), ..(**info).clone() })
+            }
+        }
+    }
+
+    /// Returns the points that meet the filters.
+    fn read(
+        self,
+        options: &LoadOptions,
+        settings: &PreparationSettings,
+        progress: &dyn Progress,
+    ) -> Result<Loaded> {
+        match self {
+            Self::File(file) => Ok(surfel_formats::load(&file, options, progress)?),
+            Self::Cloud(cloud, info) => {
+                let none = cloud.subset(&[]);
+                let cloud = Arc::unwrap_or_clone(cloud);
+                let cloud = match filter_cloud(cloud, &DAffine3::IDENTITY, settings, progress) {
+                    // Other sources may have points that meet the filters.
+                    Err(Error::NoPointKept { .. }) => none,
+                    filtered => filtered?,
+                };
+                Ok(Loaded { cloud, info: *info })
+            }
+        }
+    }
+}
+
+/// Reads points as one cloud, by the settings of a description for everything: those that its filters keep, and in metres
+/// if it says so.
 ///
 /// # Errors
 ///
-/// Fails for missing and broken files, past the memory limit, for filters that keep no point, for clouds that cannot be
-/// prepared, and if cancelled.
-pub fn prepare_files(
-    files: &[PathBuf],
+/// Fails without any source, for missing and broken files, for a filter of a column that is not there or that keeps no
+/// point, past the memory limit, and if cancelled.
+pub fn read_points(
+    sources: Vec<PointSource>,
+    description: &SceneDescription,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    read(sources, description, false, progress)
+}
+
+/// Reads points as one cloud and prepares it by the settings of a description for everything.
+///
+/// # Errors
+///
+/// Fails as [`read_points`] does, and for clouds that cannot be prepared.
+pub fn prepare_points(
+    sources: Vec<PointSource>,
     description: &SceneDescription,
     options: PrepareOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let Loaded { cloud, info } = load(files, description, options, progress)?;
-    let cloud = prepared(cloud, description, options, progress).map_err(|cause| {
-        let settings = &description.objects_default.preparation;
-        let is_empty = cause == surfel_core::Error::EmptyCloud;
-        let filter = is_empty.then(|| check_empty(files, settings)).and_then(Result::err);
-        filter.unwrap_or_else(|| Error::Content { files: files.to_vec(), cause })
-    })?;
-    if cloud.is_empty() {
-        check_empty(files, &description.objects_default.preparation)?;
-    }
+    let settings = &description.objects_default;
+    let files = names(&sources);
+    let has_estimates = columns(options, settings).any();
+    let Loaded { mut cloud, info } = read(sources, description, has_estimates, progress)?;
+    settings.preparation.drop_estimated(&mut cloud);
+    let cloud = prepared(cloud, description, options, progress)
+        .map_err(|cause| Error::Content { files, cause })?;
     Ok(Loaded { cloud, info })
 }
 
-/// Prepares a cloud, with the information about its file, by the settings of a description for everything.
-///
-/// # Errors
-///
-/// Fails for a filter of a column that is not there or that keeps no point, for clouds that cannot be prepared, and if
-/// cancelled.
-pub fn prepare_points(
-    mut loaded: Loaded,
+fn names(sources: &[PointSource]) -> Vec<PathBuf> {
+    sources.iter().enumerate().map(|(i, source)| source.name(i)).collect()
+}
+
+/// Reads points that are estimated from afterwards, if `has_estimates` says so.
+fn read(
+    sources: Vec<PointSource>,
     description: &SceneDescription,
-    options: PrepareOptions,
+    has_estimates: bool,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let settings = &description.objects_default.preparation;
-    loaded.cloud = filter_cloud(loaded.cloud, &DAffine3::IDENTITY, settings, progress)?;
-    if settings.reproject == Some(true) {
-        move_to_metres(&mut loaded.cloud, &mut loaded.info, None, progress);
-    }
-    report_degrees(&loaded, settings, progress);
-    settings.drop_estimated(&mut loaded.cloud);
-    let Loaded { cloud, info } = loaded;
-    Ok(Loaded { cloud: prepared(cloud, description, options, progress)?, info })
-}
-
-fn load(
-    files: &[PathBuf],
-    description: &SceneDescription,
-    options: PrepareOptions,
-    progress: &dyn Progress,
-) -> Result<Loaded> {
-    let inspected = files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
-    let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
-    let preparation = &description.objects_default.preparation;
-    let has_estimates = columns(options, &description.objects_default).any();
     let check_points = |points: MemoryEstimate| {
         let all = if has_estimates { points.with_estimates() } else { points };
         all.check(description.run.memory_limit)
     };
+    let names = names(&sources);
+    let inspected = names.iter().zip(&sources);
+    let inspected = inspected.map(|(name, source)| Ok((name.as_path(), source.inspect()?)));
+    let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
     // How many points a filter keeps, and a text has, is known when they are read.
-    if !preparation.filters_points() {
-        check_points(MemoryEstimate::from_files(&infos, preparation.subsample, 0))?;
+    if !settings.filters_points() {
+        check_points(MemoryEstimate::from_files(&infos, settings.subsample, 0))?;
     }
-    report_unused_of_files(infos.values(), preparation, progress);
-    let options = preparation.load_options(ColumnChoice::All)?;
-    let mut loaded = match preparation.reproject {
-        Some(true) => load_in_metres(files, &options, progress)?,
-        _ => surfel_formats::load_all(files, &options, progress)?.0,
-    };
-    progress.end();
-    check_points(MemoryEstimate::of_points(loaded.cloud.len() as u64, preparation.subsample))?;
-    let points = counted(loaded.cloud.len(), "point");
-    progress.note(&format!("{points}, {}", loaded.info.format));
-    report_degrees(&loaded, preparation, progress);
-    preparation.drop_estimated(&mut loaded.cloud);
-    Ok(loaded)
-}
-
-/// Reads files as one cloud. Those in degrees are moved to the coordinate system of the files before them.
-fn load_in_metres(
-    files: &[PathBuf],
-    options: &LoadOptions,
-    progress: &dyn Progress,
-) -> surfel_formats::Result<Loaded> {
+    report_unused_of_files(infos.values(), settings, progress);
+    let options = settings.load_options(ColumnChoice::All)?;
     let mut parts: Vec<Loaded> = Vec::new();
-    for file in files {
-        let mut part = surfel_formats::load(file, options, progress)?;
-        let others = parts.iter().find_map(|part| part.info.coordinate_system.as_deref());
-        move_to_metres(&mut part.cloud, &mut part.info, others, progress);
+    for source in sources {
+        let mut part = source.read(&options, settings, progress)?;
+        if settings.reproject == Some(true) {
+            // To the coordinate system of those before.
+            let others = parts.iter().find_map(|part| part.info.coordinate_system.as_deref());
+            move_to_metres(&mut part.cloud, &mut part.info, others, progress);
+        }
         parts.push(part);
     }
     if parts.is_empty() {
-        return Err(surfel_formats::Error::NoInput);
+        return Err(surfel_formats::Error::NoInput.into());
     }
-    Ok(merge_loaded(parts, files, progress))
-}
-
-/// Warns of coordinates in degrees, unless the settings say whether they stay.
-fn report_degrees(loaded: &Loaded, settings: &PreparationSettings, progress: &dyn Progress) {
-    let system = loaded.info.coordinate_system.as_deref();
-    if settings.reproject.is_none() && is_in_degrees(&loaded.cloud, system) {
-        let line = format!("{LOOKS_LIKE_DEGREES}; normals, radii and distances need metres");
-        progress.choice(&line, &["reproject"]);
+    let loaded = merge_loaded(parts, &names, progress);
+    progress.end();
+    if loaded.cloud.is_empty() {
+        check_empty(&names, settings)?;
     }
+    check_points(MemoryEstimate::of_points(loaded.cloud.len() as u64, settings.subsample))?;
+    let points = counted(loaded.cloud.len(), "point");
+    progress.note(&format!("{points}, {}", loaded.info.format));
+    if settings.reproject.is_none() {
+        let system = loaded.info.coordinate_system.as_deref();
+        report_degrees(&loaded.cloud, system, &["reproject"], progress);
+    }
+    Ok(loaded)
 }
 
 fn prepared(
@@ -239,25 +272,30 @@ mod tests {
 
     use super::*;
     use crate::crs::{CoordinateSystem, Unit};
-    use crate::progress_log::{Choice, ProgressLog};
+    use crate::progress_log::{ProgressLog, Records};
     use surfel_core::math::{DVec3, Vec3};
     use surfel_core::points::{
         COLUMN_INDEX, ROW_INDEX, Radius, Scalar, ScanStation, Subsample, Values,
     };
     use surfel_core::progress::NoProgress;
-    use surfel_formats::{FileInfo, SaveOptions};
+    use surfel_formats::SaveOptions;
 
-    /// Prepares a cloud without information about a file, and returns the choices that were reported.
+    /// A cloud without information about a file.
+    fn in_memory(cloud: PointCloud) -> PointSource {
+        PointSource::Cloud(Arc::new(cloud), Box::default())
+    }
+
+    /// Prepares a cloud, and returns what was reported.
     fn prepare_with(
         cloud: PointCloud,
         change: impl FnOnce(&mut PreparationSettings),
-    ) -> (Loaded, Vec<Choice>) {
+    ) -> (Loaded, Records) {
         let mut description = SceneDescription::default();
         change(&mut description.objects_default.preparation);
-        let loaded = Loaded { cloud, info: FileInfo::default() };
         let log = ProgressLog::new(&NoProgress);
-        let prepared = prepare_points(loaded, &description, PrepareOptions::default(), &log);
-        (prepared.unwrap(), log.into_choices())
+        let sources = vec![in_memory(cloud)];
+        let prepared = prepare_points(sources, &description, PrepareOptions::default(), &log);
+        (prepared.unwrap(), log.into_records())
     }
 
     /// Returns a scan around Munich in degrees.
@@ -271,15 +309,16 @@ mod tests {
     #[test]
     fn degrees_are_moved_if_asked_and_reported_otherwise() {
         let prepared = |reproject: Option<bool>| {
-            let (loaded, choices) = prepare_with(degrees(), |settings| {
+            let (loaded, Records { choices, warnings, .. }) = prepare_with(degrees(), |settings| {
                 settings.reproject = reproject;
                 settings.duplicates = Some(Duplicates::Keep);
             });
-            let lines = choices.into_iter().filter(|choice| choice.keys == ["reproject"]);
-            (loaded, lines.map(|choice| choice.reason).collect::<String>())
+            let choices = choices.iter().map(ToString::to_string);
+            let lines = choices.chain(warnings.iter().map(|warning| format!("warning: {warning}")));
+            (loaded, lines.filter(|line| line.ends_with("[reproject]")).collect::<String>())
         };
         let (moved, line) = prepared(Some(true));
-        assert!(5e6 < moved.cloud.origin.y && line.ends_with("EPSG:32632"), "{line}");
+        assert!(5e6 < moved.cloud.origin.y && line.ends_with("EPSG:32632 [reproject]"), "{line}");
         assert_eq!(moved.info.coordinate_system.as_deref(), Some("EPSG:32632"));
         let (kept, line) = prepared(None);
         assert_eq!(kept.cloud.origin.y, 48.13);
@@ -301,13 +340,47 @@ mod tests {
         description.objects_default.preparation.duplicates = Some(Duplicates::Keep);
         let options = PrepareOptions::default();
         let Loaded { cloud, info } =
-            prepare_files(&[source], &description, options, &NoProgress).unwrap();
+            prepare_points(vec![PointSource::File(source)], &description, options, &NoProgress)
+                .unwrap();
         let options = SaveOptions::from_source(&info);
         surfel_formats::save(&target, &cloud, &options, &NoProgress).unwrap();
         let system = surfel_formats::inspect(&target).unwrap().coordinate_system.unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
         let unit = CoordinateSystem::parse(&system).unwrap().unit();
         assert!(matches!(unit, Unit::Metres(_)), "{system}");
+    }
+
+    #[test]
+    fn files_and_clouds_are_moved_to_metres_before_they_become_one() {
+        let mut metres = degrees();
+        let system =
+            FileInfo { coordinate_system: Some("EPSG:32632".into()), ..FileInfo::default() };
+        move_to_metres(&mut metres, &mut FileInfo::default(), Some("EPSG:32632"), &NoProgress);
+        let mut description = SceneDescription::default();
+        description.objects_default.preparation.reproject = Some(true);
+        let sources =
+            vec![PointSource::Cloud(Arc::new(metres), Box::new(system)), in_memory(degrees())];
+        let Loaded { cloud, info } = read_points(sources, &description, &NoProgress).unwrap();
+        assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:32632"));
+        let distance = |i: usize| cloud.world_position(i).distance(cloud.world_position(900 + i));
+        assert!((0..900).all(|i| distance(i) < 0.01));
+    }
+
+    #[test]
+    fn clouds_in_memory_count_against_the_memory_limit() {
+        let mut description = SceneDescription::default();
+        description.run.memory_limit = Some(1 << 16);
+        let prepared = |description: &SceneDescription| {
+            let sources = vec![in_memory(two_walls()), in_memory(degrees())];
+            prepare_points(sources, description, PrepareOptions::default(), &NoProgress)
+        };
+        let error = prepared(&description).unwrap_err();
+        assert!(matches!(error, Error::OutOfMemory(_)), "{error}");
+        description.objects_default.preparation.filter = Some("x > 11.57".parse().unwrap());
+        let error = prepared(&description).unwrap_err();
+        assert!(matches!(error, Error::OutOfMemory(_)), "{error}");
+        description.run.memory_limit = Some(1 << 24);
+        assert!(prepared(&description).is_ok());
     }
 
     /// Returns a scan of a wall at 5 m before one at 9 m, with a column of ten points in the air between them.
@@ -341,18 +414,18 @@ mod tests {
         let mut description = SceneDescription::default();
         let filter = &mut description.objects_default.preparation.filter;
         *filter = Some("x > 50".parse().unwrap());
-        let (loaded, options) =
-            (Loaded { cloud: two_walls(), info: FileInfo::default() }, PrepareOptions::default());
-        let of_points = prepare_points(loaded, &description, options, &NoProgress);
-        let files = std::slice::from_ref(&file);
-        let of_file = prepare_files(files, &description, options, &NoProgress);
+        let prepared = |source: PointSource| {
+            prepare_points(vec![source], &description, PrepareOptions::default(), &NoProgress)
+        };
+        let of_points = prepared(in_memory(two_walls()));
+        let of_file = prepared(PointSource::File(file.clone()));
         description.files.push(file.clone());
         let of_scene = crate::resolve(&description, &NoProgress);
         std::fs::remove_file(&file).unwrap();
         let errors = [of_points.unwrap_err(), of_file.unwrap_err(), of_scene.unwrap_err()];
-        for (error, n_files) in errors.iter().zip([0, 1, 1]) {
+        for error in &errors {
             let Error::NoPointKept { files, key, filter } = error else { panic!("{error}") };
-            assert_eq!((files.len(), *key, &filter[..]), (n_files, Some("filter"), "x > 50"));
+            assert_eq!((files.len(), *key, &filter[..]), (1, Some("filter"), "x > 50"));
         }
     }
 
@@ -364,8 +437,8 @@ mod tests {
         };
         let description = SceneDescription::default();
         let options = PrepareOptions { normals: true, ..PrepareOptions::default() };
-        let loaded = Loaded { cloud: wire(), info: FileInfo::default() };
-        let cloud = prepare_points(loaded, &description, options, &NoProgress).unwrap().cloud;
+        let sources = vec![in_memory(wire())];
+        let cloud = prepare_points(sources, &description, options, &NoProgress).unwrap().cloud;
         assert!(cloud.normals.is_some() && cloud.radii.is_none() && cloud.structures().is_none());
         let radius = Some(Radius::default());
         let cloud = prepare_with(wire(), |settings| settings.radius = radius).0.cloud;
@@ -377,7 +450,7 @@ mod tests {
     #[test]
     fn mixed_pixels_are_dropped_if_asked() {
         let prepared = |mixed_pixels, subsample| {
-            let (loaded, choices) = prepare_with(two_walls(), |settings| {
+            let (loaded, Records { choices, .. }) = prepare_with(two_walls(), |settings| {
                 settings.mixed_pixels = mixed_pixels;
                 settings.subsample = subsample;
             });

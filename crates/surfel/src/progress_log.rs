@@ -1,7 +1,8 @@
-//! Records of the choices that were made from the data, and of the notes about files.
+//! Records of the choices that were made from the data, and of notes and warnings.
 
-use std::sync::{Mutex, PoisonError};
-use surfel_core::progress::Progress;
+use std::fmt;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use surfel_core::progress::{Progress, with_keys};
 
 /// A choice made from the data, because the description left it open.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,27 +13,79 @@ pub struct Choice {
     pub keys: Vec<String>,
 }
 
-/// Passes progress on, and records the choices and the notes.
+impl Choice {
+    /// Reports the choice to those who did not hear when it was made.
+    pub(crate) fn report(&self, progress: &dyn Progress) {
+        let keys: Vec<&str> = self.keys.iter().map(String::as_str).collect();
+        progress.choice(&self.reason, &keys);
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&with_keys(&self.reason, &self.keys))
+    }
+}
+
+/// A hint at what is probably not meant, as a setting that has no effect.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// The hint in one line.
+    pub line: String,
+    /// Paths of the keys that concern it; there may be none.
+    pub keys: Vec<String>,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&with_keys(&self.line, &self.keys))
+    }
+}
+
+/// The lines that were reported during work, each kind in its order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Records {
+    /// The choices; one that is made again, as for a second cloud, is listed once.
+    pub choices: Vec<Choice>,
+    /// The notes.
+    pub notes: Vec<String>,
+    /// The warnings; each is listed once.
+    pub warnings: Vec<Warning>,
+}
+
+impl Records {
+    /// Returns all lines: notes, choices, then warnings.
+    pub fn into_lines(self) -> Vec<String> {
+        let choices = self.choices.iter().map(ToString::to_string);
+        let warnings = self.warnings.iter().map(ToString::to_string);
+        self.notes.into_iter().chain(choices).chain(warnings).collect()
+    }
+}
+
+/// Passes progress on, and records choices, notes and warnings.
 pub struct ProgressLog<'p> {
     progress: &'p dyn Progress,
-    choices: Mutex<Vec<Choice>>,
-    notes: Mutex<Vec<String>>,
+    records: Mutex<Records>,
 }
 
 impl<'p> ProgressLog<'p> {
     /// An empty record; `progress` hears everything too.
     pub fn new(progress: &'p dyn Progress) -> Self {
-        Self { progress, choices: Mutex::default(), notes: Mutex::default() }
+        Self { progress, records: Mutex::default() }
     }
 
-    /// Returns the choices so far, in their order.
-    pub fn into_choices(self) -> Vec<Choice> {
-        self.choices.into_inner().unwrap_or_else(PoisonError::into_inner)
+    /// A record that goes on behind choices that were made before.
+    pub fn after(choices: Vec<Choice>, progress: &'p dyn Progress) -> Self {
+        Self { progress, records: Mutex::new(Records { choices, ..Records::default() }) }
     }
 
-    /// Returns the notes so far, in their order.
-    pub fn into_notes(self) -> Vec<String> {
-        self.notes.into_inner().unwrap_or_else(PoisonError::into_inner)
+    /// Returns the records so far.
+    pub fn into_records(self) -> Records {
+        self.records.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn records(&self) -> MutexGuard<'_, Records> {
+        self.records.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -46,15 +99,18 @@ impl Progress for ProgressLog<'_> {
     }
 
     fn note(&self, line: &str) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned());
+        self.records().notes.push(line.to_owned());
         self.progress.note(line);
     }
 
     fn choice(&self, line: &str, keys: &[&str]) {
-        let keys_owned = keys.iter().map(|key| (*key).to_owned()).collect();
-        let choice = Choice { reason: line.to_owned(), keys: keys_owned };
-        self.choices.lock().unwrap_or_else(PoisonError::into_inner).push(choice);
+        push_new(&mut self.records().choices, Choice { reason: line.into(), keys: owned(keys) });
         self.progress.choice(line, keys);
+    }
+
+    fn warning(&self, line: &str, keys: &[&str]) {
+        push_new(&mut self.records().warnings, Warning { line: line.into(), keys: owned(keys) });
+        self.progress.warning(line, keys);
     }
 
     fn end(&self) {
@@ -63,6 +119,17 @@ impl Progress for ProgressLog<'_> {
 
     fn is_cancelled(&self) -> bool {
         self.progress.is_cancelled()
+    }
+}
+
+fn owned(keys: &[&str]) -> Vec<String> {
+    keys.iter().map(|key| (*key).to_owned()).collect()
+}
+
+/// Adds an item unless the list has it.
+fn push_new<T: PartialEq>(list: &mut Vec<T>, item: T) {
+    if !list.contains(&item) {
+        list.push(item);
     }
 }
 
@@ -89,6 +156,10 @@ impl Progress for NotesAsChoices<'_> {
 
     fn choice(&self, line: &str, keys: &[&str]) {
         self.progress.choice(line, keys);
+    }
+
+    fn warning(&self, line: &str, keys: &[&str]) {
+        self.progress.warning(line, keys);
     }
 
     fn end(&self) {

@@ -241,7 +241,7 @@ mod tests {
         let [note] = &notes[..] else { panic!("{notes:?}") };
         assert!(note.starts_with("on the CPU: "), "{note}");
         assert!(
-            note.ends_with("MiB of memory are needed, and --memory-limit is 1.0 KiB"),
+            note.ends_with("MiB of memory are needed, and the limit is 1.0 KiB [memory_limit]"),
             "{note}"
         );
     }

@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::{Resolution, Rule};
-use surfel::description::{Backend, ObjectSettings};
+use surfel::description::{Backend, ObjectSettings, Section};
 use surfel::resolve::{
     MemoryEstimate, PIXEL_WITH_LAYERS, choose_camera, choose_up, prepare_cloud, short_position,
     state_known_sides,
@@ -92,12 +92,12 @@ pub struct Args {
 }
 
 impl Scope for Args {
-    fn has(heading: &str, path: &str) -> bool {
+    fn has(section: Section, path: &str) -> bool {
         let unread = ["camera.name", "camera.lock", "camera.station", "camera.interior"];
         let is_of_camera = path.starts_with("camera.") && !unread.contains(&path);
-        match heading {
-            "Preparation" => !["animation_name", "reproject"].contains(&path),
-            "Surface" => !path.starts_with("clip"),
+        match section {
+            Section::Preparation => !["animation_name", "reproject"].contains(&path),
+            Section::Surface => !path.starts_with("clip"),
             _ => is_of_camera || path == "up",
         }
     }

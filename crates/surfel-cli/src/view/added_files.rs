@@ -101,7 +101,7 @@ impl PageFile {
         let loaded = surfel_formats::load_graph_bytes(&name, bytes, &options, &log);
         let (mut graph, mut info) = loaded.map_err(surfel::Error::from).map_err(rejection)?;
         progress.end();
-        let mut notes = log.into_notes();
+        let mut notes = log.into_records().into_lines();
         if !graph.animation.channels.is_empty() {
             graph.animation = Animation::default();
             notes.push(format!("{name}: is shown as it is at the start; added files do not move"));

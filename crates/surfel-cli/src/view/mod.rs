@@ -19,7 +19,7 @@ mod page_settings;
 mod scene_provider;
 
 use crate::global::Global;
-use crate::options::{EVERYWHERE, PLANS, Scope};
+use crate::options::Scope;
 use crate::report::{Report, Verbosity, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
@@ -32,6 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use surfel::description::Section;
 use surfel::resolve::check_files;
 use surfel::{RendererOnThreads, SceneDescription, SceneRenderer, start_global_threads};
 use surfel_core::progress::Progress;
@@ -82,8 +83,9 @@ pub struct Args {
 }
 
 impl Scope for Args {
-    fn has(heading: &str, path: &str) -> bool {
-        ![EVERYWHERE, PLANS, "Output"].contains(&heading) && path != "bit_depth"
+    fn has(section: Section, path: &str) -> bool {
+        ![Section::Everywhere, Section::Plans, Section::Output].contains(&section)
+            && path != "bit_depth"
     }
 }
 

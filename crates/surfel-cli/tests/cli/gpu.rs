@@ -102,7 +102,7 @@ fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
     }
     // Lines about what was chosen come before.
     let error = text.lines().last().unwrap_or_default();
-    let expected = " of memory are needed, and --memory-limit is 2.0 MiB";
+    let expected = " of memory are needed, and the limit is 2.0 MiB [--memory-limit]";
     assert!(error.starts_with("error: ") && error.ends_with(expected), "{text}");
     assert_eq!(folder.names(), ["dome.ply"]);
     assert!(render("cpu", "120x120", "2M").status.success());

@@ -183,7 +183,7 @@ fn what_cannot_be_a_plan_is_refused() {
         (&["--gsd", "0.1", "--crs", "EPSG:4326"], 2, "degrees"),
         (&["--gsd", "0.1", "--crs", "EPSG:1"], 2, "EPSG:25832"),
         (&["--scale", "1:0"], 2, "as in 1:50"),
-        (&["--height-map", &heights], 2, "add --gsd"),
+        (&["--height-map", &heights], 2, "[--gsd]"),
         (&["--gsd", "0.1", "--surface", "points", "--height-map", &heights], 2, "needs a surface"),
         (&["--gsd", "0.1", "--height-map", "heights.png"], 2, ".tif"),
     ] {
@@ -215,7 +215,7 @@ fn the_sun_of_a_date_stands_where_the_place_says() {
     assert!((by_place - by_system - 1.92).abs() < 0.05, "{by_system}");
 
     let text = stderr(&dry(&noon));
-    assert!(text.contains("add --place LAT,LON or --crs"), "{text}");
+    assert!(text.contains("[--place, --crs]"), "{text}");
     let midnight = ["--sun", "2026-06-21T01:00+02:00", "--place", "48.1,11.6"];
     let output = dry(&midnight);
     assert!(stderr(&output).contains("below the horizon"), "{}", stderr(&output));

@@ -14,7 +14,7 @@ use crate::options::{FileInfo, LasProfile, Loaded};
 /// Merges the clouds of several files into one, relative to the origin of the largest.
 ///
 /// Columns that some of the files lack are dropped. `progress` gets a note of these, and of files whose points lie too
-/// far from the common origin to keep their resolution.
+/// far from the common origin to keep their resolution, and a warning of coordinate systems that differ.
 pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Progress) -> Loaded {
     if parts.len() < 2 {
         return parts.pop().unwrap_or_default();
@@ -31,11 +31,12 @@ pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Pr
             progress.note(&format!("{}: {loss}", path.display()));
         }
         if info.coordinate_system != infos[0].coordinate_system {
-            progress.note(&format!(
-                "warning: {}: its coordinate system differs from that of {}, or only one of them names it",
+            let line = format!(
+                "{}: its coordinate system differs from that of {}, or only one of them names it",
                 path.display(),
                 paths[0].display()
-            ));
+            );
+            progress.warning(&line, &[]);
         }
     }
     Loaded { cloud, info: common_file_info(&infos) }

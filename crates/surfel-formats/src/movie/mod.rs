@@ -175,7 +175,7 @@ impl Movie {
                 file: self.spec.file(),
                 found: format!("{} of {}", self.n_done(), counted(n_frames, "frame")),
                 expected: "all".into(),
-                advice: "run again with --resume to make the others",
+                advice: "make the others [resume]",
             });
         }
         progress.check()?;

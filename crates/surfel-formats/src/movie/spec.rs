@@ -107,7 +107,7 @@ impl MovieSpec {
             file: path.display().to_string(),
             found,
             expected: "the image of a frame as surfel wrote it".into(),
-            advice: "remove this file and run again with --resume",
+            advice: "remove this file and continue from the others [resume]",
         })
     }
 }

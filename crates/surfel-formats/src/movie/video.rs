@@ -14,7 +14,8 @@ use super::spec::MovieSpec;
 
 const CHECK_ADVICE: &str = "list the encoders of this ffmpeg with `ffmpeg -encoders`, or write .gif, .png or \
     frame_####.png, which need no other program";
-const RESUME_ADVICE: &str = "the frames are kept: correct the cause, then run again with --resume";
+const RESUME_ADVICE: &str =
+    "the frames are kept: correct the cause, then continue from there [resume]";
 
 /// Encodes one black frame and discards the result.
 ///

@@ -59,11 +59,10 @@ pub(crate) fn read(
             let is_pts = preamble.count.is_some() || input.name.to_lowercase().ends_with(".pts");
             let (columns, description) = infer_columns(&sample.rows, preamble.n_fields, is_pts);
             let is_survey = columns.first() == Some(&None);
-            let example = if is_survey { ", as -,y,x,z if the northing comes first" } else { "" };
-            progress.note(&format!(
-                "{}: no header; columns taken as {description} (state them with --columns{example})",
-                input.name
-            ));
+            let example = if is_survey { "; -,y,x,z if the northing comes first" } else { "" };
+            let line =
+                format!("{}: no header; columns taken as {description}{example}", input.name);
+            progress.choice(&line, &["columns"]);
             columns
         }
     };
@@ -124,8 +123,8 @@ fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
     let [easting_first, northing_first] = [["x", "y", "z"], ["y", "x", "z"]]
         .map(|coordinates| possible_columns(line, preamble, coordinates));
     let advice = format!(
-        "state the columns with --columns, as in {easting_first} or, if the northing comes first, {northing_first}; \
-         or remove the line if it is no point"
+        "state the columns, as in {easting_first} or, if the northing comes first, {northing_first}; \
+         or remove the line if it is no point [columns]"
     );
     input.malformed(
         Location::Line(preamble.data_line),
@@ -135,7 +134,7 @@ fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
     )
 }
 
-/// Returns columns as `--columns` takes them that fit a line of a survey: three coordinates, perhaps after the number of
+/// Returns columns as the key `columns` takes them that fit a line of a survey: three coordinates, perhaps after the number of
 /// the point, and texts that are skipped.
 fn possible_columns(line: &[u8], preamble: &Preamble, coordinates: [&str; 3]) -> String {
     let fields: Vec<&[u8]> = preamble.separator.fields(line).collect();
@@ -187,14 +186,14 @@ fn check_columns(input: &Input, columns: &[Option<ColumnRole>], preamble: &Pream
             location,
             counted(preamble.n_fields, "column"),
             format!("{}", columns.len()),
-            "state all columns with --columns, `-` for one to skip",
+            "state all columns, `-` for one to skip [columns]",
         ));
     }
     for axis in 0..3 {
         if !columns.contains(&Some(ColumnRole::Position(axis))) {
             let found =
                 format!("{} without {}", counted(columns.len(), "column"), ["x", "y", "z"][axis]);
-            let advice = "state the columns with --columns, as in x,y,z,-,r,g,b or -,n,e,h";
+            let advice = "state the columns, as in x,y,z,-,r,g,b or -,n,e,h [columns]";
             return Err(input.malformed(location, found, "columns x, y and z", advice));
         }
     }

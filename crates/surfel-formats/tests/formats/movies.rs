@@ -213,7 +213,10 @@ fn frames_with_other_settings_are_not_reused() {
         ] {
             let Err(error) = Movie::open(&path, &changed, true) else { panic!("{name}: reused") };
             assert!(matches!(error, Error::ResumeMismatch { .. }), "{error}");
-            assert!(error.to_string().contains("without --resume"), "{error}");
+            assert!(
+                error.to_string().contains("start again instead of resuming [resume]"),
+                "{error}"
+            );
         }
         // The rejected attempts keep the frames, and the frame rate does not affect frames.
         let faster = MovieOptions { fps: 50.0, ..options() };

@@ -12,7 +12,7 @@ use crate::las_point_formats::{N_POINTS, file};
 use crate::malformed::small_files;
 use crate::{pcd, ptx};
 
-const ADVICE: &str = "; --salvage reads what is whole";
+const ADVICE: &str = "; what is whole can be read [salvage]";
 
 pub fn options() -> LoadOptions {
     LoadOptions { salvage: true, ..LoadOptions::default() }
@@ -116,7 +116,7 @@ fn fields_before_the_end_of_a_compressed_file_are_read() {
         let loaded = load_bytes("a.pcd", &bytes[..length], &options(), &listener);
         let Ok(Loaded { cloud, .. }) = loaded else {
             let refused = loaded.unwrap_err().to_string();
-            assert!(!refused.contains("--salvage"), "{refused}");
+            assert!(!refused.contains("[salvage]"), "{refused}");
             assert!(found.is_empty(), "{length} of {} {refused}", bytes.len());
             continue;
         };
@@ -137,7 +137,7 @@ fn fields_before_the_end_of_a_compressed_file_are_read() {
     }
     let refused = read("a.pcd", &bytes[..bytes.len() - 9]).unwrap_err().to_string();
     assert!(refused.contains("500 of 500 points are whole"), "{refused}");
-    assert!(refused.ends_with("; --salvage reads what is whole"), "{refused}");
+    assert!(refused.ends_with("; what is whole can be read [salvage]"), "{refused}");
 }
 
 #[test]

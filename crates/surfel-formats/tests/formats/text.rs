@@ -181,7 +181,7 @@ fn invalid_lines_are_errors_with_a_line_number() {
     assert_eq!(
         message("1 2 3\n4 5\n"),
         "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; repair or remove the line; \
-         --salvage reads what is whole"
+         what is whole can be read [salvage]"
     );
     assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
     assert!(message("1,2,3\n1,5;2,5;3,5\n").contains("`5;2`, expected a number"));
@@ -259,7 +259,7 @@ fn text_without_a_header_needs_stated_columns() {
     let file = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
     let error = read("a.csv", file).unwrap_err().to_string();
     assert!(error.contains("line 1: found `P1,20,10,3,TREE`"), "{error}");
-    assert!(error.contains("--columns, as in -,x,y,z,- or, if"), "{error}");
+    assert!(error.contains("state the columns, as in -,x,y,z,- or, if"), "{error}");
     for (line, expected) in [
         ("20,10,3,TREE", ["x,y,z,-", "y,x,z,-"]),
         ("1,20,10,3,TREE", ["-,x,y,z,-", "-,y,x,z,-"]),

@@ -31,6 +31,7 @@ from surfel._native import (
     animate,
     load,
     prepare,
+    read_cloud,
     view,
 )
 from surfel._rays import create_rays_pinhole
@@ -57,5 +58,6 @@ __all__ = [
     "create_rays_pinhole",
     "load",
     "prepare",
+    "read_cloud",
     "view",
 ]

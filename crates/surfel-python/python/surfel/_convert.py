@@ -1,5 +1,7 @@
 """Clouds and meshes of other packages, recognised by what they have; none of the packages is imported."""
 
+import os
+
 from surfel._arrays import as_array
 from surfel._errors import InvalidArray
 
@@ -10,6 +12,8 @@ _COLORS = ("red", "green", "blue")
 
 def cloud_columns(source):
     """The columns of a cloud as keywords of `Cloud`, or `None` if `source` is an array of positions."""
+    if isinstance(source, (str, os.PathLike)):
+        raise InvalidArray(f"points: found the path {os.fspath(source)}, expected an array (N, 3); surfel.read_cloud reads files")
     for reader in (_laspy, _open3d, _open3d_tensor, _pyvista, _trimesh, _table):
         columns = reader(source)
         if columns is not None:

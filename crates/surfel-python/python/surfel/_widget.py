@@ -47,7 +47,7 @@ def _widget_class(anywidget, traitlets):
 
         def __init__(self, viewer):
             self._viewer = viewer
-            super().__init__(link=viewer.link)
+            super().__init__(link=viewer.url)
 
         @traitlets.observe("origin")
         def _allow(self, change):

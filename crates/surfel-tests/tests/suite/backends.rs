@@ -403,7 +403,7 @@ fn more_memory_than_the_limit_is_refused_before_the_upload() {
     let error = refusing.render(&scene, &settings, &NoProgress).unwrap_err();
     assert_eq!(refusing.upload_time().n_bytes, 0);
     let Error::Renderer(reason) = error else { panic!("{error}") };
-    let expected = " of memory are needed, and --memory-limit is 64.0 KiB";
+    let expected = " of memory are needed, and the limit is 64.0 KiB [memory_limit]";
     assert!(reason.ends_with(expected), "{reason}");
     let enough = open().with_memory_limit(Some(1 << 24));
     check_on(&enough, "limit", &scene, &settings);

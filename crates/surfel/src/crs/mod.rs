@@ -5,7 +5,7 @@ mod reproject;
 mod wkt;
 
 pub use georeference::georeference;
-pub use reproject::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
+pub use reproject::{is_in_degrees, move_to_metres, report_degrees};
 pub use wkt::short_name;
 
 use proj4rs::Proj;

@@ -20,8 +20,19 @@ const MIN_UPRIGHT_RANGE: f64 = 0.35;
 /// near zero.
 const MIN_OFFSET_RATIO: f64 = 100.0;
 
-/// Begin of a warning about coordinates that stay in degrees.
-pub const LOOKS_LIKE_DEGREES: &str = "warning: x and y look like degrees of longitude and latitude";
+/// Warns of points that stay in degrees, if they do. `keys` are those of settings that move them; there may be none.
+pub fn report_degrees(
+    cloud: &PointCloud,
+    system: Option<&str>,
+    keys: &[&str],
+    progress: &dyn Progress,
+) {
+    if is_in_degrees(cloud, system) {
+        let line = "x and y look like degrees of longitude and latitude; normals, radii and distances need metres: \
+                    move the points to a coordinate system in metres";
+        progress.warning(line, keys);
+    }
+}
 
 /// Moves the points of a cloud in degrees to metres, to the coordinate system of `others` if these have one, and reports it.
 /// Everything else stays as it is.

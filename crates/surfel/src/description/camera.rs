@@ -4,7 +4,7 @@ use super::Invalid;
 use super::keys::settings;
 use super::place::{CrsRule, PlaceRule};
 use super::rule::{
-    Axis, Checked, Direction, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
+    Arity, Axis, Checked, Direction, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
 };
 use crate::crs::Place;
 use serde_json::{Value, json};
@@ -54,7 +54,7 @@ settings! {
         /// Looks all around (equirectangular): the width is a full turn, the height reaches from straight up to
         /// straight down. Stands at a free spot inside the scene unless a position is given. Best twice as wide as
         /// high.
-        panorama: bool, Flag, "";
+        panorama: bool, Flag, "BOOL";
         /// Direction in which the camera looks at the whole scene: 0,0,-1 for a map.
         direction: DVec3, Direction, "X,Y,Z";
         /// Rotates the chosen camera about the scene, or a panorama from north, in degrees clockwise from above.
@@ -71,7 +71,7 @@ settings! {
         /// and tunnels from within.
         interior: Interior = Interior::Auto, OneOf(INTERIORS), "WHEN";
         /// Keeps the camera where it is, even if the scene animates it.
-        lock: bool = false, Flag, "";
+        lock: bool = false, Flag, "BOOL";
         /// Looks through the camera of this name in a glTF file [default: the first].
         name: String, Text, "NAME";
     }
@@ -114,6 +114,10 @@ impl Rule<OrthographicHeight> for OrthographicRule {
             OrthographicHeight::Fit => json!(true),
             OrthographicHeight::Fixed(height) => json!(height),
         }
+    }
+
+    fn arity(&self) -> Arity {
+        Arity::Optional
     }
 }
 

@@ -41,6 +41,10 @@ impl Rule<ClipBox> for ClipBoxRule {
         let ranges: Vec<String> = finite.map(|(low, high)| format!("[{low},{high}]")).collect();
         json!(format!("({})", ranges.join(",")))
     }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
+    }
 }
 
 /// Reads `([low,high],[low,high])` and so on, as PDAL writes bounds.
@@ -74,6 +78,10 @@ impl Rule<ClipPlane> for ClipPlaneRule {
 
     fn write(&self, value: &ClipPlane) -> Value {
         json!([value.point.to_array(), value.normal.to_array()].concat())
+    }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
     }
 }
 

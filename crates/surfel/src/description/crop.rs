@@ -158,6 +158,10 @@ impl Rule<Crop> for CropRule {
             Crop::File(path) => json!(absolute_text(path)),
         }
     }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
+    }
 }
 
 #[cfg(test)]

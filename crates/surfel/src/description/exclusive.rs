@@ -1,7 +1,8 @@
 //! Keys that exclude each other.
 
+use super::Invalid;
 use super::keys::KeyedSettings;
-use super::{Invalid, Part};
+use super::section::Part;
 
 /// Keys of the camera that a plan to scale has none of.
 const NOT_OF_PLANS: &[&str] = &[

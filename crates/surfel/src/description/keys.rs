@@ -1,6 +1,7 @@
 //! Declares settings: one line gives a field, its key in scene files, its option, its help and its default.
 
 use super::Invalid;
+use super::rule::Arity;
 use serde_json::Value;
 use std::path::Path;
 
@@ -11,8 +12,12 @@ pub struct Key {
     pub name: &'static str,
     /// Meaning of the key in sentences, with its unit.
     pub doc: &'static str,
-    /// Placeholder for the value in help texts, as in `DEG`; empty for flags.
+    /// Placeholder for the value in help texts, as in `DEG`.
     pub value_name: &'static str,
+    /// Whether the key may be given without a value.
+    pub arity: Arity,
+    /// True if values may begin with a hyphen.
+    pub may_begin_with_hyphen: bool,
     /// The value that counts if none is set; `None` if it is chosen from the data.
     pub default: Option<Value>,
     /// True for the keys that are used most; short help texts list no others.
@@ -84,6 +89,9 @@ macro_rules! settings {
                     name: stringify!($field),
                     doc: concat!($($doc, "\n"),+).trim_ascii(),
                     value_name: $value_name,
+                    arity: $crate::description::rule::Rule::<$type>::arity(&$rule),
+                    may_begin_with_hyphen:
+                        $crate::description::rule::Rule::<$type>::may_begin_with_hyphen(&$rule),
                     default: settings!(@default $rule, $type $(, $default)?),
                     is_common: settings!(@is_common $($common)?),
                 } ),* ]

@@ -28,6 +28,7 @@ mod place;
 mod plan;
 mod point_filter;
 pub mod rule;
+mod section;
 mod table;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
@@ -50,6 +51,7 @@ pub use option::{has_option, is_list, option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 pub use plan::PlanSettings;
 pub use point_filter::Returns;
+pub use section::{Part, Section};
 pub(crate) use table::write_parts;
 pub use table::write_table;
 
@@ -102,17 +104,6 @@ pub struct SceneDescription {
     pub views: ViewSettings,
 }
 
-/// A part of a description: a heading for help texts, the table that its keys stand in, and the settings.
-#[derive(Clone, Copy, Debug)]
-pub struct Part<S> {
-    /// Heading of its options.
-    pub heading: &'static str,
-    /// Name of its table with a dot, as in `camera.`, or empty.
-    pub prefix: &'static str,
-    /// The settings.
-    pub settings: S,
-}
-
 impl std::fmt::Debug for dyn KeyedSettings + '_ {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_map().entries(write_table(self)).finish()
@@ -147,23 +138,23 @@ impl SceneDescription {
     /// Returns the parts with their keys.
     pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 15] {
         let [surface, preparation, color] = self.objects_default.parts();
-        let part = |heading, prefix, settings| Part { heading, prefix, settings };
+        let part = |section, prefix, settings| Part { section, prefix, settings };
         [
-            part("Output", "", &self.output as &dyn KeyedSettings),
-            part("Picture", "", &self.picture),
+            part(Section::Output, "", &self.output as &dyn KeyedSettings),
+            part(Section::Picture, "", &self.picture),
             surface,
-            part("Plans to scale", "", &self.plan),
-            part("Camera (in the file's own coordinates)", "camera.", &self.camera),
-            part("World", "", &self.world),
-            part("Light", "", &self.light),
-            part("Light", "sun.", &self.sun),
-            part("Light", "sky.", &self.sky),
+            part(Section::Plans, "", &self.plan),
+            part(Section::Camera, "camera.", &self.camera),
+            part(Section::World, "", &self.world),
+            part(Section::Light, "", &self.light),
+            part(Section::Light, "sun.", &self.sun),
+            part(Section::Light, "sky.", &self.sky),
             color,
             preparation,
-            part("Everywhere", "", &self.run),
-            part("Materials", "", &self.materials),
-            part("Materials", "", &self.overrides),
-            part("Views", "", &self.views),
+            part(Section::Everywhere, "", &self.run),
+            part(Section::Materials, "", &self.materials),
+            part(Section::Materials, "", &self.overrides),
+            part(Section::Views, "", &self.views),
         ]
     }
 
@@ -188,13 +179,13 @@ impl SceneDescription {
         ]
     }
 
-    /// Returns all keys outside of objects, lamps and animations, with their paths and the headings of their parts.
-    pub fn keys() -> Vec<(String, &'static str, Key)> {
+    /// Returns all keys outside of objects, lamps and animations, with their paths and sections.
+    pub fn keys() -> Vec<(String, Section, Key)> {
         let description = Self::default();
         let parts = description.parts().into_iter();
-        let keys = parts.flat_map(|Part { prefix, heading, settings }| {
+        let keys = parts.flat_map(|Part { prefix, section, settings }| {
             let keys = settings.keys().into_iter();
-            keys.map(move |key| (format!("{prefix}{}", key.name), heading, key))
+            keys.map(move |key| (format!("{prefix}{}", key.name), section, key))
         });
         keys.collect()
     }

@@ -1,12 +1,15 @@
 //! Settings that an object may have for itself: surface, preparation, colour.
 
+use super::Invalid;
 use super::clip_rule::{ClipBoxRule, ClipPlaneRule};
 use super::color_rule::{ColorSourceRule, ColormapRule};
 use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
 use super::point_filter::{Classes, RETURNS, Returns, point_filters};
-use super::rule::{Checked, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, number, parsed};
-use super::{Invalid, Part};
+use super::rule::{
+    Checked, ColumnNames, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, number, parsed,
+};
+use super::section::{Part, Section};
 use serde_json::Value;
 use std::path::Path;
 use surfel_core::image::Colormap;
@@ -136,7 +139,7 @@ settings! {
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
-        columns: String, Text, "NAMES";
+        columns: String, ColumnNames, "NAMES";
         /// Plays the animation of this name of glTF files that have any [default: the first].
         animation_name: String, Text, "NAME";
     }
@@ -175,9 +178,9 @@ impl ObjectSettings {
     /// Returns the settings as parts with their keys.
     pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 3] {
         [
-            Part { heading: "Surface", prefix: "", settings: &self.surface },
-            Part { heading: "Preparation", prefix: "", settings: &self.preparation },
-            Part { heading: "Colour", prefix: "", settings: &self.color },
+            Part { section: Section::Surface, prefix: "", settings: &self.surface },
+            Part { section: Section::Preparation, prefix: "", settings: &self.preparation },
+            Part { section: Section::Color, prefix: "", settings: &self.color },
         ]
     }
 

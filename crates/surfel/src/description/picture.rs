@@ -33,12 +33,12 @@ settings! {
         /// Seed of the random numbers; another seed gives other noise.
         seed: u64 = Settings::default().seed, count(0, u64::MAX), "N";
         /// Draws a legend: the classes that are there with their colours, or the colour map with its values.
-        legend: bool = false, Flag, "";
+        legend: bool = false, Flag, "BOOL";
         /// Draws a bar of a round length; for pictures without perspective, as by --camera-orthographic or --gsd.
-        scale_bar: bool = false, Flag, "";
+        scale_bar: bool = false, Flag, "BOOL";
         /// Draws an arrow to the north, which is +Y if +Z is up; for pictures without perspective, as by
         /// --camera-orthographic or --gsd.
-        north: bool = false, Flag, "";
+        north: bool = false, Flag, "BOOL";
         /// Writes a line of text at the lower left.
         caption: String, Text, "TEXT";
         /// Bits per channel of a PNG or TIFF.

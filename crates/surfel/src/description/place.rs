@@ -47,6 +47,10 @@ impl Rule<Place> for PlaceRule {
     fn write(&self, value: &Place) -> Value {
         json!([value.latitude_deg, value.longitude_deg])
     }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
+    }
 }
 
 /// A date and time with the offset of its time zone.

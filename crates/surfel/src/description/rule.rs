@@ -20,6 +20,27 @@ pub trait Rule<T> {
 
     /// Writes a value as a scene file has it.
     fn write(&self, value: &T) -> Value;
+
+    /// Returns whether a key may be given without a value.
+    fn arity(&self) -> Arity {
+        Arity::One
+    }
+
+    /// Returns true if values may begin with a hyphen, as `-1,2,3` does.
+    fn may_begin_with_hyphen(&self) -> bool {
+        false
+    }
+}
+
+/// The number of values that a key takes where words set it, as on a command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arity {
+    /// One value.
+    One,
+    /// One value or none, which means `true`.
+    Optional,
+    /// One value or none, which means `true`. The value is joined to the key, so that the next word is none.
+    Flag,
 }
 
 /// Coordinates, lengths and factors stay below this: beyond, their squares are not finite in f32.
@@ -145,6 +166,10 @@ impl Rule<bool> for Flag {
     fn write(&self, value: &bool) -> Value {
         json!(value)
     }
+
+    fn arity(&self) -> Arity {
+        Arity::Flag
+    }
 }
 
 /// Any text.
@@ -162,6 +187,23 @@ impl Rule<String> for Text {
 
     fn write(&self, value: &String) -> Value {
         json!(value)
+    }
+}
+
+/// Names of columns in a list, as in `x,y,z,-,r,g,b`.
+pub struct ColumnNames;
+
+impl Rule<String> for ColumnNames {
+    fn read(&self, value: &Value, folder: &Path) -> Result<String, Invalid> {
+        Text.read(value, folder)
+    }
+
+    fn write(&self, value: &String) -> Value {
+        json!(value)
+    }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
     }
 }
 
@@ -283,6 +325,10 @@ impl Rule<DVec3> for Vector {
     fn write(&self, value: &DVec3) -> Value {
         json!(value.to_array())
     }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
+    }
 }
 
 /// A vector of length 1; others are normalised.
@@ -300,6 +346,10 @@ impl Rule<DVec3> for Direction {
 
     fn write(&self, value: &DVec3) -> Value {
         json!(value.to_array())
+    }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
     }
 }
 
@@ -324,6 +374,10 @@ impl Rule<Vec3> for Axis {
 
     fn write(&self, value: &Vec3) -> Value {
         json!(value.to_array())
+    }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
     }
 }
 
@@ -368,6 +422,10 @@ impl Rule<(f64, f64)> for Interval {
 
     fn write(&self, (low, high): &(f64, f64)) -> Value {
         json!([low, high])
+    }
+
+    fn may_begin_with_hyphen(&self) -> bool {
+        true
     }
 }
 

@@ -1,9 +1,9 @@
 //! Tables of keys and values: those of parts are read and written, and tables in tables are found by their paths.
 
-use super::Part;
 use super::invalid::Invalid;
 use super::keys::KeyedSettings;
 use super::nearest::{nearest, synonym};
+use super::section::Part;
 use serde_json::{Map, Value};
 use std::path::Path;
 

@@ -43,8 +43,8 @@ pub fn finish_graph(
     clip(scene, &mut graph, &mut sequences, description)?;
     let shows_color_alone = assign_materials(scene, &mut graph, &mut sequences, description);
     if shows_color_alone {
-        let line = "warning: the surface points shows nothing of a material but its colour";
-        progress.choice(line, &["surface", "material"]);
+        let line = "the surface points shows nothing of a material but its colour";
+        progress.warning(line, &["surface", "material"]);
     }
     Ok((graph, sequences))
 }

@@ -1,6 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
+use crate::crs::{is_in_degrees, move_to_metres, report_degrees};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings, with_nearest};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
@@ -53,21 +53,12 @@ pub fn import(
     match content {
         // Rays that meet them are in their coordinates.
         Some(MemoryContent::Points(cloud, system)) => {
-            report_degrees(cloud, system.as_deref(), progress);
+            report_degrees(cloud, system.as_deref(), &[], progress);
         }
         _ if settings.preparation.reproject() => return Ok(with_metres(loaded, options, progress)),
         _ => {}
     }
     Ok(loaded)
-}
-
-/// Warns of points in memory whose coordinates look like degrees.
-fn report_degrees(cloud: &PointCloud, system: Option<&str>, progress: &dyn Progress) {
-    if is_in_degrees(cloud, system) {
-        progress.note(&format!(
-            "{LOOKS_LIKE_DEGREES}, z like metres; reproject the points to a system in metres first, with pyproj for example"
-        ));
-    }
 }
 
 fn import_from_file(
@@ -445,16 +436,16 @@ mod tests {
         let file = FileContent { graph: graph_of(cloud.clone()), info: FileInfo::default() };
         let contents =
             [MemoryContent::File(Arc::new(file)), MemoryContent::Points(Arc::new(cloud), None)];
-        let origins_and_notes = contents.map(|content| {
+        let origins_and_warnings = contents.map(|content| {
             let mut options = ImportOptions::default();
             options.memory.insert("scan", content);
             let log = ProgressLog::new(&NoProgress);
             let settings = ObjectSettings::default();
             let (graph, _) = import(Path::new("scan"), &settings, &options, &log).unwrap();
             let origin = into_cloud(graph).unwrap().origin;
-            (origin.y, log.into_notes().iter().any(|note| note.contains("look like degrees")))
+            (origin.y, log.into_records().warnings.len())
         });
-        assert!(5e6 < origins_and_notes[0].0 && !origins_and_notes[0].1);
-        assert_eq!(origins_and_notes[1], (48.13, true));
+        assert!(5e6 < origins_and_warnings[0].0 && origins_and_warnings[0].1 == 0);
+        assert_eq!(origins_and_warnings[1], (48.13, 1));
     }
 }

@@ -25,9 +25,8 @@ pub fn choose_room<'a>(
         _ => None,
     };
     if room.is_none() && description.camera.interior() == Interior::On {
-        let line = "no room was found: nothing is hidden; stand inside with --camera-position or \
-            --camera-station";
-        progress.choice(line, &["camera.interior"]);
+        let line = "no room was found: nothing is hidden; stand inside";
+        progress.warning(line, &["camera.interior", "camera.position", "camera.station"]);
     }
     room
 }

@@ -8,6 +8,7 @@ use surfel_core::bytes::readable;
 use surfel_core::flat::{MAX_GAUSSIAN_BYTES, PointBlock, max_field_bytes};
 use surfel_core::math::LANES;
 use surfel_core::points::{GAUSSIAN_COLUMNS, MAX_REST_COLUMNS, PointCloud, Subsample};
+use surfel_core::progress::with_keys;
 use surfel_core::scene::{Geometry, Graph};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::words::counted;
@@ -193,9 +194,10 @@ impl MemoryEstimate {
         let things = [(self.n_points, "point"), (self.n_triangles, "triangle")];
         let there = things.iter().filter(|(count, _)| 0 < *count);
         let things: Vec<String> = there.map(|(count, name)| counted(*count, name)).collect();
-        Err(Error::OutOfMemory(format!(
-            "{} need about {} of memory ({} as read, {} {}, {} picture), and \
-             --memory-limit is {}; {}raise the limit",
+        let (advice, key) = self.advice(limit).unzip();
+        let line = format!(
+            "{} need about {} of memory ({} as read, {} {}, {} picture), and the limit is {}; \
+             {}raise the limit",
             things.join(" and "),
             readable(all),
             readable(read),
@@ -203,16 +205,18 @@ impl MemoryEstimate {
             if prepared == self.preparation() { "preparation" } else { "tree" },
             readable(picture),
             readable(limit),
-            self.advice(limit),
-        )))
+            advice.unwrap_or_default(),
+        );
+        let keys: Vec<&str> = key.into_iter().chain(["memory_limit"]).collect();
+        Err(Error::OutOfMemory(with_keys(&line, &keys)))
     }
 
     fn total(&self) -> u64 {
         sum(self.peak().map(|bytes| (bytes, 1)))
     }
 
-    /// Advice that helps besides a higher limit, if there is any.
-    fn advice(&self, limit: u64) -> String {
+    /// Advice that helps besides a higher limit, if there is any, with the key that it is about.
+    fn advice(&self, limit: u64) -> Option<(String, &'static str)> {
         let least = Self { n_kept_points: 0, n_estimated_points: 0, ..*self }.total();
         let splat = if 0 < self.n_splats { MAX_GAUSSIAN_BYTES as u64 } else { 0 };
         let estimate = if 0 < self.n_estimated_points { ESTIMATED_POINT } else { 0 };
@@ -220,12 +224,12 @@ impl MemoryEstimate {
         let fitting = limit.saturating_sub(least) / each * 2;
         let [.., picture] = self.bytes();
         if 0 < fitting && fitting < self.n_kept_points {
-            return format!("keep fewer points with --subsample random:{fitting} or ");
+            return Some((format!("keep fewer points, as random:{fitting}, or "), "subsample"));
         }
         if self.total() / 2 < picture {
-            return "make a smaller picture with --resolution or ".into();
+            return Some(("make a smaller picture or ".into(), "resolution"));
         }
-        String::new()
+        None
     }
 }
 
@@ -274,7 +278,12 @@ mod tests {
         flat_point: FLAT_POINT,
     };
 
-    fn advice(n_points: u64, n_kept_points: u64, picture: u64, limit: u64) -> String {
+    fn advice(
+        n_points: u64,
+        n_kept_points: u64,
+        picture: u64,
+        limit: u64,
+    ) -> Option<(String, &'static str)> {
         let estimate = MemoryEstimate { n_points, n_kept_points, picture, ..NOTHING };
         assert!(limit < estimate.total());
         estimate.advice(limit)
@@ -283,15 +292,16 @@ mod tests {
     #[test]
     fn the_advice_fits_the_limit() {
         let (n_points, limit) = (1_000_000, 60_000_000);
-        let text = advice(n_points, n_points, 760_000, limit);
+        let (text, key) = advice(n_points, n_points, 760_000, limit).unwrap();
+        assert_eq!(key, "subsample");
         let n_kept_points = text.split(|c: char| !c.is_ascii_digit()).find(|word| !word.is_empty());
         let n_kept_points = n_kept_points.unwrap().parse().unwrap();
         let estimate = MemoryEstimate { n_points, n_kept_points, picture: 760_000, ..NOTHING };
         assert!(limit - 1000 < estimate.total() && estimate.total() <= limit, "{text}");
         // Fewer points do not reduce what is read.
-        assert_eq!(advice(n_points, n_points, 760_000, 30_000_000), "");
-        assert_eq!(advice(n_points, 16, 760_000, 30_000_000), "");
-        assert!(advice(64, 64, 19_000, 10_000).contains("--resolution"));
+        assert_eq!(advice(n_points, n_points, 760_000, 30_000_000), None);
+        assert_eq!(advice(n_points, 16, 760_000, 30_000_000), None);
+        assert_eq!(advice(64, 64, 19_000, 10_000).unwrap().1, "resolution");
     }
 
     #[test]

@@ -50,7 +50,7 @@ use crate::crs::{CoordinateSystem, Unit, georeference};
 use crate::description::{CameraSettings, LightKind, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use crate::overlay::{Overlay, faults};
-use crate::progress_log::{Choice, ProgressLog};
+use crate::progress_log::{Choice, ProgressLog, Records, Warning};
 use camera::SceneExtent;
 use complete_description::{common_color, complete_description};
 use inside::{Inside, choose_inside};
@@ -82,6 +82,8 @@ pub struct Resolved {
     pub description: SceneDescription,
     /// The choices that were made, in the order of the work.
     pub choices: Vec<Choice>,
+    /// Hints at what is probably not meant, in the order of the work.
+    pub warnings: Vec<Warning>,
     /// Sequences whose files are read one by one.
     pub(crate) sequences: Vec<Sequence>,
     /// The camera with its movement.
@@ -112,7 +114,8 @@ pub fn resolve(description: &SceneDescription, progress: &dyn Progress) -> Resul
     let scene = LoadedScene::read(description, keep, &log)?;
     let auto = AutoSettings::choose(&scene, description, &log)?;
     let mut resolved = scene.into_resolved(auto, &log)?;
-    resolved.choices = log.into_choices();
+    let Records { choices, warnings, .. } = log.into_records();
+    (resolved.choices, resolved.warnings) = (choices, warnings);
     Ok(resolved)
 }
 
@@ -243,13 +246,14 @@ impl LoadedScene {
             false => Overlay::new(&description.picture, legend, (up, unit), progress),
         };
         let settings = render_settings(&description);
-        let choices = Vec::new();
+        let (choices, warnings) = (Vec::new(), Vec::new());
         let description = complete;
         Ok(Resolved {
             scene,
             settings,
             description,
             choices,
+            warnings,
             sequences,
             camera,
             turned_room,

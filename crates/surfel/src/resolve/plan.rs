@@ -60,7 +60,7 @@ pub fn frame_plan(
         let [width, height] = window.size;
         let message = format!(
             "the plan has {width:.0}x{height:.0} pixels, more than {MAX_PIXELS} in all; use larger \
-             pixels, or give the size of a sheet by --resolution and its middle by --camera-focal-point"
+             pixels, or give the size of a sheet and its middle [resolution, camera.focal_point]"
         );
         Invalid::at(key, message)
     })?;
@@ -70,8 +70,8 @@ pub fn frame_plan(
     if description.picture.resolution.is_none()
         && let Some(outside) = window.points_outside(&camera, points)
     {
-        let line = outside.warning(unit.symbol());
-        progress.choice(&line, &["resolution", "camera.focal_point"]);
+        let line = outside.line(unit.symbol());
+        progress.warning(&line, &["resolution", "camera.focal_point"]);
     }
     description.picture.resolution = Some((width, height));
     description.camera = window.camera_settings(&description.camera, &camera);
@@ -85,12 +85,12 @@ pub(crate) fn height_map_place(
     georeference: Option<Georeference>,
 ) -> std::result::Result<Georeference, Invalid> {
     if description.objects_default.surface.surface() == SurfaceKind::Points {
-        let advice = "needs a surface; leave out --surface points";
+        let advice = "needs a surface other than points [surface]";
         return Err(Invalid::at("height_map", advice));
     }
     georeference.ok_or_else(|| {
         let advice =
-            "needs a camera that looks straight down without perspective: add --gsd LENGTH";
+            "needs a camera that looks straight down without perspective: state the size of a pixel [gsd]";
         Invalid::at("height_map", advice)
     })
 }
@@ -241,14 +241,14 @@ struct PointsOutside {
 
 impl PointsOutside {
     /// Returns a line for the user.
-    fn warning(&self, unit: &str) -> String {
+    fn line(&self, unit: &str) -> String {
         let Self { n_points, distance, size: [width, height], middle, pixel_size } = self;
         let points = counted(*n_points, "point");
         // As exact as a tenth of a pixel.
         let n_decimals = (1.0 - pixel_size.log10()).ceil().clamp(0.0, 12.0) as usize;
         let [x, y, z] = middle.to_array().map(|x| format!("{x:.n_decimals$}"));
         format!(
-            "warning: {points} outside of the plan, up to {distance:.1} {unit} away; {width:.0}x{height:.0} pixels \
+            "{points} outside of the plan, up to {distance:.1} {unit} away; {width:.0}x{height:.0} pixels \
              about {x},{y},{z} show all"
         )
     }

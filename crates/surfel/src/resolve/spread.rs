@@ -23,9 +23,9 @@ pub fn report_coverage(image: &Image, progress: &dyn Progress) {
             percent => format!("only {percent:.2} %"),
         };
         let line = format!(
-            "warning: {share} of the picture is covered; move the camera nearer, or give points a larger radius"
+            "{share} of the picture is covered; move the camera nearer, or give points a larger radius"
         );
-        progress.choice(&line, &["camera.zoom_factor", "camera.focal_point", "radius"]);
+        progress.warning(&line, &["camera.zoom_factor", "camera.focal_point", "radius"]);
     }
 }
 
@@ -38,9 +38,9 @@ pub fn report_gaps(points: &PointCloud, progress: &dyn Progress) {
     });
     let Some((gap, size)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
     let line = format!(
-        "warning: parts of the scene lie {gap:.4} apart, but are only {size:.4} long; are they in one coordinate system?"
+        "parts of the scene lie {gap:.4} apart, but are only {size:.4} long; are they in one coordinate system?"
     );
-    progress.choice(&line, &["clip_box", "crop"]);
+    progress.warning(&line, &["clip_box", "crop"]);
 }
 
 /// Returns the largest gap between coordinates and the length of the longer part beside it, if the gap is out of
@@ -62,16 +62,16 @@ mod tests {
 
     use super::*;
     use crate::SceneDescription;
-    use crate::progress_log::{Choice, ProgressLog};
+    use crate::progress_log::{ProgressLog, Warning};
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
 
-    fn reported(offset: f32) -> Vec<Choice> {
+    fn reported(offset: f32) -> Vec<Warning> {
         let part = |x: f32| (0..100).map(move |i| Vec3::new(x + 0.01 * i as f32, 0.0, 0.0));
         let cloud = PointCloud::from_positions(part(0.0).chain(part(offset)).collect());
         let log = ProgressLog::new(&NoProgress);
         report_gaps(&cloud, &log);
-        log.into_choices()
+        log.into_records().warnings
     }
 
     #[test]
@@ -104,11 +104,11 @@ mod tests {
             let image = Image { coverage: vec![coverage; 100], ..Image::new(10, 10) };
             let log = ProgressLog::new(&NoProgress);
             report_coverage(&image, &log);
-            log.into_choices()
+            log.into_records().warnings
         };
         assert_eq!((lines(0.001).len(), lines(0.01).len()), (1, 0));
-        assert!(lines(0.001)[0].reason.starts_with("warning: only 0.10 % of the picture"));
-        assert!(lines(1e-5)[0].reason.starts_with("warning: less than 0.01 % of the picture"));
-        assert!(lines(0.0)[0].reason.starts_with("warning: no part of the picture"));
+        assert!(lines(0.001)[0].line.starts_with("only 0.10 % of the picture"));
+        assert!(lines(1e-5)[0].line.starts_with("less than 0.01 % of the picture"));
+        assert!(lines(0.0)[0].line.starts_with("no part of the picture"));
     }
 }

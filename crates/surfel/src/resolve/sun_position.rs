@@ -25,14 +25,13 @@ pub fn stand_sun_at_date(
 ) -> Result<(), Invalid> {
     let Some(date) = description.sun.date.take() else { return Ok(()) };
     if !description.light.has(LightKind::Sun) {
-        progress.choice("warning: no effect: the lights have no sun", &["sun", "light"]);
+        progress.warning("no effect: the lights have no sun", &["sun", "light"]);
         return Ok(());
     }
     let system = coordinate_system(scene, description);
     let place = description.world.place.or_else(|| system.as_ref()?.place(position));
     let Some(place) = place else {
-        let advice =
-            "no file states where on Earth it lies; add --place LAT,LON or --crs EPSG:CODE";
+        let advice = "no file states where on Earth it lies; add its latitude and longitude, or the EPSG code of its coordinates [place, crs]";
         return Err(Invalid::at("sun", advice));
     };
     let by_axes = Compass { north: north(up).as_dvec3(), up: up.as_dvec3() };
@@ -67,10 +66,10 @@ fn without_sun(
     kinds.retain(|kind| *kind != LightKind::Sun);
     let below = format!("the sun is {:.1} degrees below the horizon", -elevation_deg);
     if kinds.is_empty() && description.light.environment.is_none() {
-        let advice = "choose another time, or add another light, as in --light sun,sky";
+        let advice = "choose another time, or add another light, as in sun,sky [light]";
         return Err(Invalid::at("sun", format!("{below}; {advice}")));
     }
-    progress.note(&format!("warning: {below}: it gives no light"));
+    progress.warning(&format!("{below}: it gives no light"), &["sun"]);
     description.light.light = Some(kinds);
     Ok(())
 }

@@ -156,7 +156,8 @@ def _shared_keys(surveys):
         distances = [description.get("sky", {}).get("ao_distance", 0) for description, _, _ in surveys]
         keys["sky"] = keys["sky"] | {"ao_distance": max(distances)}
     ranges = [found for _, _, found in surveys if found is not None]
-    if ranges and "range" not in keys:
+    # A tile may be coloured by no map where another one is.
+    if surveys[0][2] is not None and "range" not in keys:
         keys["range"] = (min(low for low, _ in ranges), max(high for _, high in ranges))
     return keys
 

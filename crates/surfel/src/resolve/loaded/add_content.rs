@@ -87,7 +87,7 @@ impl LoadedScene {
         let log = ProgressLog::new(progress);
         let (graph, info) = import(file, settings, &options, &log)?;
         let (n_points, n_triangles) = graph.n_points_and_triangles();
-        let notes = log.into_notes();
+        let notes = log.into_records().into_lines();
         let points = graph.sample_points();
         let Aabb { min, max } = inlier_bounds(&points);
         let bounds = [min, max].map(|corner| points.origin + corner.as_dvec3());

@@ -57,12 +57,12 @@ impl LoadedScene {
             if color == ColorSource::Class && columns.contains(&"class") {
                 let files = list_files(self.files_of(i, description));
                 return Err(Error::Unfit(format!(
-                    "{files}: all classes are zero; choose another --color"
+                    "{files}: all classes are zero; choose other colours [color]"
                 )));
             }
             return Err(Error::Unfit(format!(
-                "{}: no column {color}{}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
-                 name and what the file has: {}",
+                "{}: no column {color}{}; there are {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, CSS colour \
+                 names and what the file has: {} [color]",
                 list_files(self.files_of(i, description)),
                 nearest_if_any(&color.to_string(), columns.iter().copied()),
                 ColorSource::names_where(ColorSource::is_computed).join(", "),

@@ -73,7 +73,7 @@ pub struct LoadedFile {
     pub n_triangles: usize,
     /// Least and greatest coordinates in the file's own coordinate system, outliers aside.
     pub bounds: [DVec3; 2],
-    /// Notes of the reader, as of what was repaired or left out.
+    /// Lines of the reader, as of what was repaired or left out.
     pub notes: Vec<String>,
 }
 

@@ -20,18 +20,18 @@ impl LoadedScene {
         let picture = &description.picture;
         if 0.0 < picture.noise_threshold() && picture.spp() <= MIN_ADAPTIVE_SAMPLES {
             let line = format!(
-                "warning: no effect: noise is estimated after {MIN_ADAPTIVE_SAMPLES} camera rays per pixel, of which there are \
+                "no effect: noise is estimated after {MIN_ADAPTIVE_SAMPLES} camera rays per pixel, of which there are \
                  {} at most",
                 picture.spp()
             );
-            progress.choice(&line, &["noise_threshold", "spp"]);
+            progress.warning(&line, &["noise_threshold", "spp"]);
         }
         let camera = &description.camera;
         // A plan looks in the direction, and has its middle at the focal point.
         let is_turned = !camera.has_both_ends() || description.plan.is_to_scale();
         if let (Some(key), false) = (camera.direction_key(), is_turned) {
-            let line = "warning: no effect: position and focal point state the direction already";
-            progress.choice(line, &[key, "camera.position", "camera.focal_point"]);
+            let line = "no effect: position and focal point state the direction already";
+            progress.warning(line, &[key, "camera.position", "camera.focal_point"]);
         }
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
@@ -79,8 +79,8 @@ impl LoadedScene {
             ),
         ] {
             if is_unused {
-                let line = format!("warning: no effect: only for the surface {kinds}");
-                progress.choice(&line, &[key, "surface"]);
+                let line = format!("no effect: only for the surface {kinds}");
+                progress.warning(&line, &[key, "surface"]);
             }
         }
         let ColorSettings { cmap, range, .. } = &description.objects_default.color;
@@ -89,8 +89,9 @@ impl LoadedScene {
             set.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
         if !keys.is_empty() && !sources.iter().any(ColorSource::is_mapped) {
             keys.push("color");
-            let line = "warning: no effect: maps colour values, as elevation, intensity and columns have them";
-            progress.choice(line, &keys);
+            let line =
+                "no effect: maps colour values, as elevation, intensity and columns have them";
+            progress.warning(line, &keys);
         }
     }
 
@@ -110,9 +111,9 @@ impl LoadedScene {
         let keys: Vec<&str> =
             all.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
         if !keys.is_empty() {
-            let line = "warning: settings for points do not change triangles, which keep the colours of their \
+            let line = "settings for points do not change triangles, which keep the colours of their \
                         materials and vertices";
-            progress.choice(line, &keys);
+            progress.warning(line, &keys);
         }
     }
 }
@@ -130,7 +131,7 @@ fn report_unused_of_lights(description: &SceneDescription, progress: &dyn Progre
             continue;
         }
         let keys: Vec<&str> = paths.iter().map(String::as_str).chain(["light"]).collect();
-        progress.choice(&format!("warning: no effect: no {name} shines"), &keys);
+        progress.warning(&format!("no effect: no {name} shines"), &keys);
     }
 }
 
@@ -143,22 +144,20 @@ pub(crate) fn report_unused_of_files<'i>(
     let infos: Vec<&FileInfo> = infos.into_iter().collect();
     let has_none = |kind: &str| !infos.iter().any(|info| info.format.starts_with(kind));
     if settings.columns.is_some() && has_none("text") {
-        let line =
-            "warning: no effect, since no file is text: all other formats name their columns";
-        progress.choice(line, &["columns"]);
+        let line = "no effect, since no file is text: all other formats name their columns";
+        progress.warning(line, &["columns"]);
     }
     for column in TextColumn::parse_list(settings.columns.as_deref().unwrap_or_default()) {
         let Some(name) = column.scalar() else { continue };
         if let Some(meant) = misspelled(name, TextColumn::NAMES) {
-            let line = format!(
-                "warning: column `{name}` has no meaning; the nearest known one is `{meant}`"
-            );
-            progress.choice(&line, &["columns"]);
+            let line =
+                format!("column `{name}` has no meaning; the nearest known one is `{meant}`");
+            progress.warning(&line, &["columns"]);
         }
     }
     if settings.animation_name.is_some() && has_none("glTF") {
-        let line = "warning: no effect, since no file is glTF: only these have animations";
-        progress.choice(line, &["animation_name"]);
+        let line = "no effect, since no file is glTF: only these have animations";
+        progress.warning(line, &["animation_name"]);
     }
 }
 
@@ -171,8 +170,8 @@ fn report_unused_of_output(description: &SceneDescription, progress: &dyn Progre
     let extension = extension.as_str();
     let has_depths = ["png", "tif", "tiff"].contains(&extension);
     if description.picture.bit_depth == Some(BitDepth::Sixteen) && !has_depths {
-        let line = format!("warning: no effect on .{extension}: only .png and .tif have 16 bits");
-        progress.choice(&line, &["bit_depth"]);
+        let line = format!("no effect on .{extension}: only .png and .tif have 16 bits");
+        progress.warning(&line, &["bit_depth"]);
     }
     let backdrop = match extension {
         "jpg" | "jpeg" => Some("white"),
@@ -180,15 +179,14 @@ fn report_unused_of_output(description: &SceneDescription, progress: &dyn Progre
         _ => Some("black"),
     };
     if let (Some(color), Background::Transparent) = (backdrop, description.picture.background()) {
-        let line = format!("warning: .{extension} has no transparency: the background is {color}");
-        progress.choice(&line, &["background"]);
+        let line = format!(".{extension} has no transparency: the background is {color}");
+        progress.warning(&line, &["background"]);
     }
     let states_dpi = has_depths || ["jpg", "jpeg"].contains(&extension);
     let plan = &description.plan;
     if let (Some(dpi), false) = (plan.dpi, plan.is_to_scale()) {
         let place = if states_dpi { "stated in the file alone" } else { "not stated in the file" };
-        let line =
-            format!("warning: {dpi} pixels per inch are {place}: without a scale no size follows");
-        progress.choice(&line, &["dpi", "scale"]);
+        let line = format!("{dpi} pixels per inch are {place}: without a scale no size follows");
+        progress.warning(&line, &["dpi", "scale"]);
     }
 }
