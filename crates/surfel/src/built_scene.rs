@@ -146,7 +146,7 @@ impl BuiltScene {
         let log = ProgressLog::new(progress);
         let exposure = self.description.light.exposure();
         let stops = exposure_stops(exposure, &self.renderer, &self.flat, &self.settings, &log)?;
-        self.choices.extend(log.into_choices());
+        self.choices.extend(log.into_records().choices);
         expose(&mut self.flat, stops);
         self.stops = stops;
         self.lights.clone_from(&self.flat.lights);
