@@ -50,6 +50,7 @@ pub use cloud::gaussians::{
 };
 pub use cloud::merge::merge;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
+pub use cloud::known_column::{KnownColumn, plain_name};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};
 pub use denoising::denoise::{Denoise, DenoiseReport, Denoised, denoise};
 pub use denoising::line_axes::LineReport;
