@@ -10,7 +10,7 @@ use crate::resolve::{
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::points::{
-    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, STRUCTURE,
+    Denoise, Duplicates, MixedPixels, NoisePoints, Orientation, PointCloud, Preparation, STRUCTURE,
     StructureChoice, denoise, prepare, select_points,
 };
 use surfel_core::progress::Progress;
@@ -165,6 +165,7 @@ fn prepared(
     let mut preparation = Preparation {
         denoise: settings.preparation.denoise.unwrap_or(Denoise::Off),
         duplicates: settings.preparation.duplicates.unwrap_or(Duplicates::Keep),
+        noise_points: settings.preparation.noise_points.unwrap_or(NoisePoints::Keep),
         mixed_pixels: settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep),
         ..settings.preparation(seed)
     };
@@ -228,6 +229,7 @@ fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let has_other_steps = preparation.subsample.is_some()
         || preparation.filters_points()
         || preparation.duplicates.is_some()
+        || preparation.noise_points.is_some()
         || preparation.mixed_pixels.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
@@ -374,5 +376,22 @@ mod tests {
         assert_eq!(prepared(None, all), (200, false));
         // Nor are they beside normals and radii.
         assert_eq!(prepare_with(two_walls(), |_| ()).0.cloud.len(), 200);
+    }
+
+    #[test]
+    fn points_of_noise_are_kept_unless_asked() {
+        let prepared = |noise_points| {
+            let mut cloud = two_walls();
+            cloud.classification = Some((0..200).map(|i| if i < 9 { 7 } else { 2 }).collect());
+            let (loaded, choices) = prepare_with(cloud, |settings| {
+                settings.duplicates = Some(Duplicates::Keep);
+                settings.noise_points = noise_points;
+            });
+            let is_reported = choices.iter().any(|choice| choice.keys == ["noise_points"]);
+            (loaded.cloud.len(), is_reported)
+        };
+        assert_eq!(prepared(None), (200, true));
+        assert_eq!(prepared(Some(NoisePoints::Keep)), (200, true));
+        assert_eq!(prepared(Some(NoisePoints::Drop)), (191, false));
     }
 }

@@ -1,6 +1,6 @@
 //! Settings of the preparation of a cloud.
 
-use super::cleaning::clean::Duplicates;
+use super::cleaning::clean::{Duplicates, NoisePoints};
 use super::cleaning::outliers::OutlierRemoval;
 use super::cleaning::subsample::Subsample;
 use super::denoising::denoise::Denoise;
@@ -19,6 +19,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 pub struct Preparation {
     /// The choice whether duplicates are dropped.
     pub duplicates: Duplicates,
+    /// The choice whether points are dropped that are no measurement of a surface.
+    pub noise_points: NoisePoints,
     /// ASPRS classes of noise whose points are kept.
     pub kept_noise: Vec<u8>,
     /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
@@ -56,6 +58,7 @@ impl Default for Preparation {
     fn default() -> Self {
         Self {
             duplicates: Duplicates::default(),
+            noise_points: NoisePoints::default(),
             kept_noise: Vec::new(),
             mixed_pixels: MixedPixels::default(),
             subsample: None,
