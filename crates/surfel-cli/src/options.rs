@@ -53,11 +53,12 @@ fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
         .hide_short_help(!key.is_common)
         .action(if is_list(path) { ArgAction::Append } else { ArgAction::Set });
     match key.value_name {
-        "" | "BOOL" => {
-            let arg = arg.value_name("BOOL").num_args(0..=1).require_equals(true);
+        // A file may follow: a value needs an equals sign.
+        name @ ("" | "BOOL" | "HEIGHT") => {
+            let name = if name.is_empty() { "BOOL" } else { name };
+            let arg = arg.value_name(name).num_args(0..=1).require_equals(true);
             arg.default_missing_value("true")
         }
-        "HEIGHT" => arg.value_name("HEIGHT").num_args(0..=1).default_missing_value("true"),
         name => arg
             .value_name(name)
             .allow_hyphen_values(name.contains(',') || MAY_BEGIN_WITH_HYPHEN.contains(&name)),
@@ -131,6 +132,8 @@ mod tests {
         assert_eq!(description.camera.panorama, Some(false));
         assert_eq!((description.picture.spp(), description.materials.choices().len()), (7, 2));
         assert_eq!(description.objects_default.preparation.vertices, Some(true));
+        let high = parse(["--camera-orthographic=2.5"]);
+        assert_eq!(high.get("camera.orthographic"), Some(json!(2.5)));
         let off = parse(["--camera-orthographic=false"]);
         assert_eq!(off.get("camera.orthographic"), Some(json!(false)));
     }

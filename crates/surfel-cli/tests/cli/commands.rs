@@ -77,7 +77,7 @@ fn render_accepts_all_surfaces_and_colors() {
     let lights = ["sun", "sky", "headlight", "sun,sky,headlight", "none"];
     assert!(all_differ(&lights.map(|light| render(&["--light", light, "--sun-angle", "0"]))));
     render(&["--camera-orthographic", "--camera-direction", "0,0,-1"]);
-    render(&["--camera-orthographic", "3", "--up", "-Y", "--exposure", "-1"]);
+    render(&["--camera-orthographic=3", "--up", "-Y", "--exposure", "-1"]);
     render(&["--camera-panorama"]);
     render(&["--camera-panorama", "--camera-position", "0,0,0.2", "--camera-azimuth-angle", "30"]);
     render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
