@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE", help = output_help())]
     output: PathBuf,
     /// Adds normals. Normals and radii are both added if you choose no step: none of --normals, --normals-k,
-    /// --normals-radius, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --noise-points,
+    /// --normals-radius, --radius, --structure, --orient, --filter, --class, --returns, --crop, --duplicates, --noise-points,
     /// --subsample, --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,

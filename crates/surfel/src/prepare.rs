@@ -5,7 +5,7 @@ use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
     MemoryEstimate, check_empty, keep_matching, report_denoise, report_normals, report_radii,
-    report_unused_of_files,
+    report_unused_of_files, report_unused_structure,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -179,6 +179,9 @@ fn prepared(
     }
     let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
     let (has_normals, has_radii) = (columns.normals || had_normals, columns.radii || had_radii);
+    if !preparation.finds_structures(&cloud) {
+        report_unused_structure(&settings.preparation, progress);
+    }
     // Normals hold the directions of lines.
     if !has_normals {
         preparation.structure = StructureChoice::Surface;
@@ -216,14 +219,16 @@ fn without_estimates(
     Ok(cloud)
 }
 
-/// Returns the columns that were asked for; normals and radii if nothing was.
+/// Returns the columns that were asked for; normals and radii if nothing was. Structures need both.
 fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let preparation = &settings.preparation;
+    let has_structures = preparation.structure.is_some();
     let columns = Columns {
         normals: options.normals
+            || has_structures
             || preparation.estimates_normals()
             || preparation.orient.is_some_and(|orient| orient != Orientation::None),
-        radii: preparation.radius.is_some(),
+        radii: has_structures || preparation.radius.is_some(),
         variation: options.keep_variation,
     };
     let has_other_steps = preparation.subsample.is_some()
@@ -393,5 +398,15 @@ mod tests {
         assert_eq!(prepared(None), (200, true));
         assert_eq!(prepared(Some(NoisePoints::Keep)), (200, true));
         assert_eq!(prepared(Some(NoisePoints::Drop)), (191, false));
+    }
+
+    #[test]
+    fn structures_that_are_asked_for_bring_normals_and_radii() {
+        let cloud = prepare_with(two_walls(), |settings| {
+            settings.structure = Some(StructureChoice::Scatter);
+            settings.subsample = Some(Subsample::First(150));
+        });
+        let cloud = cloud.0.cloud;
+        assert!(cloud.normals.is_some() && cloud.radii.is_some() && cloud.structures().is_some());
     }
 }

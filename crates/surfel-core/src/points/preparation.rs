@@ -1,5 +1,6 @@
 //! Settings of the preparation of a cloud.
 
+use super::PointCloud;
 use super::cleaning::clean::{Duplicates, NoisePoints};
 use super::cleaning::outliers::OutlierRemoval;
 use super::cleaning::subsample::Subsample;
@@ -79,6 +80,15 @@ impl Default for Preparation {
 }
 
 impl Preparation {
+    /// Returns true if some points of a cloud may be lines or scatter that the cloud does not state itself.
+    pub fn finds_structures(&self, cloud: &PointCloud) -> bool {
+        let has_own = cloud.radii.is_some() || cloud.structures().is_some();
+        // Points that move may change their structure.
+        let moves = !cloud.morphs.is_empty() || cloud.skin.is_some();
+        let is_chosen = self.structure != StructureChoice::Surface;
+        !has_own && !moves && is_chosen && self.radius.rank().is_some()
+    }
+
     /// Checks the settings.
     ///
     /// # Errors
