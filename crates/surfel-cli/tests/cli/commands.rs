@@ -288,6 +288,11 @@ fn info_counts_triangles_and_points_without_position() {
     let cloud = folder.write("a.xyz", "1 2 3\nnan 5 6\n7 8 9\n");
     let table = succeed(&["info", &cloud]);
     assert!(table.contains("1 of them without a position"), "{table}");
+    let nowhere = folder.write("b.xyz", "nan 5 6\nnan 5 7\n");
+    let table = succeed(&["info", &nowhere]);
+    assert!(table.contains("bounds        none: no point has a position"), "{table}");
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &nowhere])).unwrap();
+    assert_eq!(info["bounds"], Value::Null);
 }
 
 #[test]
