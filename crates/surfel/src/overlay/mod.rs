@@ -176,7 +176,9 @@ pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Inval
     let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
     let fault = |key: &str| {
         let advice = match is_orthographic {
-            false => "needs a camera without perspective: add --camera-orthographic",
+            false => {
+                "needs a camera without perspective: add --camera-orthographic, or --gsd for a plan"
+            }
             true => "north is along the view; look down, as with --camera-direction 0,0,-1",
         };
         Invalid::at(key, advice)
@@ -375,7 +377,9 @@ mod tests {
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
         let (picture, _) = everything();
         let error = faults(&picture, &camera, Vec3::Z).remove(0);
-        assert!(error.to_string().contains("--camera-orthographic"), "{error}");
+        for option in ["--camera-orthographic", "--gsd"] {
+            assert!(error.to_string().contains(option), "{error}");
+        }
         assert_eq!(error.path, "scale_bar");
     }
 }
