@@ -35,9 +35,8 @@ mod prepare;
 #[cfg(test)]
 mod test_clouds;
 
-pub use cleaning::clean::{
-    CleanOptions, CleanReport, Duplicates, NOISE_CLASSES, NoisePoints, clean,
-};
+pub use cleaning::clean::{CleanReport, NOISE_CLASSES, clean};
+pub use cleaning::clean_options::{CleanOptions, Duplicates, NoisePoints};
 pub use cleaning::outliers::{OutlierRemoval, remove_outliers};
 pub use cleaning::subsample::{Subsample, subsample};
 pub use cloud::color_bits::{COLOR_8_TO_16, have_8_bits, to_8_bits};

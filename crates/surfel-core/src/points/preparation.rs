@@ -1,7 +1,7 @@
 //! Settings of the preparation of a cloud.
 
 use super::PointCloud;
-use super::cleaning::clean::{Duplicates, NoisePoints};
+use super::cleaning::clean_options::{Duplicates, NoisePoints};
 use super::cleaning::outliers::OutlierRemoval;
 use super::cleaning::subsample::Subsample;
 use super::denoising::denoise::Denoise;

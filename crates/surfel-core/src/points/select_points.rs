@@ -1,7 +1,8 @@
 //! The points of a cloud that its preparation keeps.
 
 use super::PointCloud;
-use super::cleaning::clean::{CleanOptions, CleanReport, clean};
+use super::cleaning::clean::{CleanReport, clean};
+use super::cleaning::clean_options::CleanOptions;
 use super::cleaning::outliers::remove_outliers;
 use super::cleaning::subsample::subsample;
 use super::preparation::Preparation;

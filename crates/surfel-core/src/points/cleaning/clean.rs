@@ -1,5 +1,6 @@
 //! Cleaning: drops points and marks entries that no later step can use, and counts them.
 
+use super::clean_options::{CleanOptions, Duplicates, NoisePoints};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::points::is_valid_position;
@@ -29,39 +30,6 @@ pub struct CleanReport {
     pub n_scaled_normals: usize,
     /// Number of radii that are not positive and finite, set to zero, which `prepare` takes as missing.
     pub n_invalid_radii: usize,
-}
-
-/// The choice whether duplicates are dropped: all but the first of points at one position. Points with different normals,
-/// as those that the faces of an edge share, are no duplicates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Duplicates {
-    /// They are dropped.
-    #[default]
-    Drop,
-    /// They stay.
-    Keep,
-}
-
-/// The choice whether points are dropped that are no measurement of a surface: those of classes of noise, those flagged
-/// withheld, and many at exactly zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum NoisePoints {
-    /// They are dropped, unless there are no others.
-    #[default]
-    Drop,
-    /// They stay.
-    Keep,
-}
-
-/// Choices of [`clean`].
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CleanOptions<'a> {
-    /// The choice whether duplicates are dropped.
-    pub duplicates: Duplicates,
-    /// The choice whether points are dropped that are no measurement of a surface.
-    pub noise_points: NoisePoints,
-    /// ASPRS classes of noise whose points are kept.
-    pub kept_noise: &'a [u8],
 }
 
 /// Minimum cosine, of any sign, between the normals of duplicates.
