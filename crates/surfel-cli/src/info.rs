@@ -106,8 +106,8 @@ fn summarize(file: &Path, header: &FileInfo) -> Value {
 fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Result<Value> {
     let Loaded { cloud, info: source } = loaded;
     let bounds = cloud.bounds();
-    let corner =
-        |corner: Vec3| (!cloud.is_empty()).then(|| (cloud.origin + corner.as_dvec3()).to_array());
+    let corner = |corner: Vec3| (cloud.origin + corner.as_dvec3()).to_array();
+    let corners = || json!({ "min": corner(bounds.min), "max": corner(bounds.max) });
     let distance = if cloud.is_empty() { 0.0 } else { spacing(&cloud.positions, report)? };
     let up = infer_up(cloud, &up_convention(cloud, std::slice::from_ref(source)));
     Ok(json!({
@@ -116,7 +116,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "points": cloud.len(),
         "points_without_position": cloud.len() - cloud.positions.iter().filter(|p| is_valid_position(**p)).count(),
         "triangles": source.n_triangles,
-        "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
+        "bounds": (!bounds.is_empty()).then(corners),
         // Adding 0 turns -0 into 0.
         "global_shift": (cloud.origin + DVec3::ZERO).to_array(),
         "spacing": distance,
@@ -239,14 +239,15 @@ fn table(info: &Value) -> String {
         row("harmonics", format!("degree {}", text(&info["spherical_harmonics_degree"])));
     }
     let bounds = &info["bounds"];
+    let is_summary = info["columns"].is_null();
     row(
         "bounds",
         match bounds {
+            Value::Null if !is_summary => "none: no point has a position".to_owned(),
             Value::Null => text(bounds),
             bounds => format!("{} to {}", text(&bounds["min"]), text(&bounds["max"])),
         },
     );
-    let is_summary = info["columns"].is_null();
     if !is_summary {
         row("global shift", text(&info["global_shift"]));
         row("spacing", format!("{} between points, about", text(&info["spacing"])));

@@ -49,8 +49,8 @@ fn option(path: &str, section: Section, key: &Key) -> Arg {
         .action(if is_list(path) { ArgAction::Append } else { ArgAction::Set });
     match key.arity {
         Arity::One => arg,
-        Arity::Optional => arg.num_args(0..=1).default_missing_value("true"),
-        Arity::Flag => arg.num_args(0..=1).require_equals(true).default_missing_value("true"),
+        // A file may follow: a value needs an equals sign.
+        Arity::Optional => arg.num_args(0..=1).require_equals(true).default_missing_value("true"),
     }
 }
 
@@ -121,6 +121,8 @@ mod tests {
         assert_eq!(description.camera.panorama, Some(false));
         assert_eq!((description.picture.spp(), description.materials.choices().len()), (7, 2));
         assert_eq!(description.objects_default.preparation.vertices, Some(true));
+        let high = parse(["--camera-orthographic=2.5"]);
+        assert_eq!(high.get("camera.orthographic"), Some(json!(2.5)));
         let off = parse(["--camera-orthographic=false"]);
         assert_eq!(off.get("camera.orthographic"), Some(json!(false)));
     }

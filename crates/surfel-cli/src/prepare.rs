@@ -24,8 +24,8 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE", help = output_help())]
     output: PathBuf,
     /// Adds normals. Normals and radii are both added if you choose no step: none of --normals, --normals-k,
-    /// --normals-radius, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --subsample,
-    /// --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
+    /// --normals-radius, --radius, --structure, --orient, --filter, --class, --returns, --crop, --duplicates, --noise-points,
+    /// --subsample, --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
     #[arg(long, help_heading = Section::Preparation.heading())]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
@@ -56,7 +56,7 @@ Examples:
   surfel prepare scan.laz -o ground.laz --class ground                points of a class
   surfel prepare scan.laz -o kept.laz --remove-outliers statistical   without points that stand alone
   surfel prepare scan.laz -o once.laz --duplicates drop               one point at each position
-  surfel prepare scan.laz -o scan.xyz --duplicates keep               as text, without noise and withheld points
+  surfel prepare scan.laz -o scan.xyz --duplicates keep               as text, with all points
   surfel prepare scan.laz -o calm.laz --denoise on                    points moved onto their surface
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";

@@ -10,6 +10,7 @@ use crate::usage::Usage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use surfel::animate;
 use surfel::description::{Backend, Section};
 use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
 use surfel::{SceneDescription, start_global_threads};
@@ -111,7 +112,7 @@ pub fn render_to_file(
     let mut scene = timed(&mut seconds.build, || resolved.build_trees(report))?;
     scene.choose_exposure(report)?;
     report_threads(scene.simd(), report);
-    scene.seek(description.output.time(), report)?;
+    animate::seek(&mut scene, description.output.time(), report)?;
     let (image, rendered) = scene.render_with(report)?;
     report.end();
     report.check()?;

@@ -48,6 +48,23 @@ def test_frames_are_those_of_the_program(hill, recipe, tmp_path):
         assert ours.read_bytes() == theirs.read_bytes(), i
 
 
+def test_frames_of_another_recipe_are_rendered_again(hill, recipe, tmp_path):
+    pattern = tmp_path / "frame_##.png"
+
+    def saved(recipe, n_frames):
+        names = save_frames(recipe, range(n_frames), pattern)
+        return [pathlib.Path(name).read_bytes() for name in names]
+
+    first = saved(recipe, 2)
+    (tmp_path / "frame_01.png").write_bytes(b"kept")
+    (tmp_path / "frame_03.png").write_bytes(b"foreign")
+    again = saved(recipe, 3)
+    assert again[:2] == [b"kept", first[1]] and again[2] != b"foreign"
+    other = saved(Recipe(hill, turntable=2, **{**SMALL, "spp": 2}), 3)
+    assert b"kept" not in other and not set(other) & set(first)
+    assert saved(recipe, 2) == first
+
+
 def test_tiles_join_to_the_program_s_picture(hill, tmp_path):
     program("render", *options(hill), "-o", tmp_path / "whole.png", "--legend")
     whole = (tmp_path / "whole.png").read_bytes()
@@ -142,7 +159,7 @@ def test_frames_are_written_where_the_client_runs(recipe, tmp_path, monkeypatch)
             client.run(os.chdir, os.path.dirname(tmp_path))
             names = save_frames(recipe, range(2), "frame_##.png")
     assert names == [str(tmp_path / name) for name in ("frame_01.png", "frame_02.png")]
-    assert sorted(os.listdir(tmp_path)) == ["frame_01.png", "frame_02.png"]
+    assert sorted(os.listdir(tmp_path)) == [".frame_##.png.recipe", "frame_01.png", "frame_02.png"]
     assert dask.compute(*render_frames(recipe, range(2))) == tuple(open(name, "rb").read() for name in names)
 
 

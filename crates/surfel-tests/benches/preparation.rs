@@ -7,7 +7,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use std::hint::black_box;
 use surfel_core::math::{Random, Vec3};
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood, map_neighborhoods};
-use surfel_core::points::{Duplicates, clean, fit_plane, orient, prepare, subsample};
+use surfel_core::points::{CleanOptions, clean, fit_plane, orient, prepare, subsample};
 use surfel_core::points::{Orientation, PointCloud, Preparation, Subsample};
 use surfel_core::progress::NoProgress;
 
@@ -70,7 +70,7 @@ fn steps(criterion: &mut Criterion) {
     group.sample_size(10).throughput(Throughput::Elements(n_points() as u64));
     let cloud = PointCloud::from_positions(in_scan_order());
     group.bench_function("clean", |bencher| {
-        bencher.iter(|| clean(cloud.clone(), Duplicates::Drop, &[], &NoProgress))
+        bencher.iter(|| clean(cloud.clone(), &CleanOptions::default(), &NoProgress))
     });
     group.bench_function("subsample spacing", |bencher| {
         bencher.iter(|| subsample(black_box(&cloud), Subsample::Spacing(2.0), 0, &NoProgress));

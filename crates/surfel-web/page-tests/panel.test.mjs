@@ -2,17 +2,18 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { pictureControls, pointControls } from '../page/controls.js';
 import { mergePatch } from '../page/merge-patch.js';
 import { Panel } from '../page/panel.js';
 import { signal } from '../page/signal.js';
 import { fakeDocument } from './fake-dom.mjs';
 
 /** The row of a control, its inputs, and the changes that it makes. */
-function rowOf(control, scene) {
+function rowOf(control, scene, info) {
   const document = fakeDocument();
   const changes = [];
   const viewer = {
-    scene, initialScene: scene, sceneChanged: signal(), cameraChanged: signal(), rejected: signal(),
+    scene, info, initialScene: scene, sceneChanged: signal(), cameraChanged: signal(), rejected: signal(),
     changeSettings: (patch, isMoving) => {
       changes.push({ patch, isMoving });
       viewer.show(patch);
@@ -88,4 +89,24 @@ test('a drag that becomes a scroll ends, and one that ends by itself is reported
     for (const run of timers) run();
     assert.deepEqual(changes.map(({ isMoving }) => isMoving), [true, false], event);
   }
+});
+
+test('a number of samples beyond the limit of the server becomes the limit', () => {
+  const control = pictureControls.find(({ key }) => key === 'spp');
+  const { changes, inputs: [, number] } = rowOf(control, { spp: 4 }, { limits: { max_samples: 1024 } });
+  number.valueAsNumber = 5000;
+  number.emit('change');
+  assert.deepEqual(changes.at(-1).patch, { spp: 1024 });
+});
+
+test('classes of noise read as hidden, and the usual classes are no choice', () => {
+  const info = { classes: [2, 6, 7].map((one) => ({ class: one, is_hidden: one === 7 })) };
+  const { read, write } = pointControls.find(({ key }) => key === 'class');
+  assert.deepEqual(read({}, { info }), [2, 6]);
+  assert.deepEqual(read({ noise_points: 'keep' }, { info }), [2, 6, 7]);
+  assert.deepEqual(read({ class: [7] }, { info }), [7]);
+  for (const [classes, expected] of [[[2, 6], null], [[2], [2]], [[2, 7], [2, 7]], [[2, 6, 7], [2, 6, 7]]]) {
+    assert.deepEqual(write(classes, {}, { info }), { class: expected });
+  }
+  assert.deepEqual(write([2, 6, 7], { noise_points: 'keep' }, { info }), { class: null });
 });

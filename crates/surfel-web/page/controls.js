@@ -1,6 +1,7 @@
 // The table of controls: each scene-file key that the panel shows, with its label, kind and range.
 
 import * as clip from './clip.js';
+import { areEqual } from './merge-patch.js';
 import { distance, normalize, scale } from './vector.js';
 
 // A control is { key, label, kind, … } with the properties of its kind in fields.js (range, options, names …). It shows
@@ -37,7 +38,7 @@ export const surfaceControls = [
     options: () => [{ value: 'angular-gap', label: 'angular gap' }, { value: 'off', label: 'off' }] },
   { key: 'octree_depth', label: 'Octree depth', kind: 'select', help: 'Levels of the octree; automatic: as fine as the points',
     isVisible: ({ surface }) => surface === 'octree' || surface === 'octree-splat',
-    options: () => [{ value: 'auto', label: 'automatic' }, ...Array.from({ length: 12 }, (_, i) => String(i + 1))],
+    options: () => [{ value: 'auto', label: 'automatic' }, ...Array.from({ length: 16 }, (_, i) => String(i + 1))],
     read: (scene) => String(scene.octree_depth ?? 'auto') },
 ];
 
@@ -55,7 +56,9 @@ export const colorControls = [
     isVisible: (scene, viewer) => scene.color === 'rgb' || hasMap(scene, viewer), help: 'Brightens dark colours or values' },
 ];
 
-const allClasses = ({ info }) => info.classes.map((one) => one.class);
+/** The classes that are shown unless the scene names some. */
+const usualClasses = ({ noise_points: choice }, { info }) =>
+  info.classes.filter((one) => choice === 'keep' || !one.is_hidden).map((one) => one.class);
 
 export const pointControls = [
   { key: 'filter', label: 'Filter', kind: 'text', isWide: true, placeholder: 'z > 100 && intensity < 5000',
@@ -65,8 +68,8 @@ export const pointControls = [
   { key: 'class', label: 'Classes', kind: 'checklist', isWide: true, isVisible: (_, { info }) => 0 < info.classes.length,
     help: 'Shows only points of these classes',
     options: ({ info }) => info.classes.map((one) => ({ ...one, value: one.class })),
-    read: (scene, viewer) => scene.class ?? allClasses(viewer),
-    write: (classes, _, viewer) => ({ class: classes.length < allClasses(viewer).length ? classes : null }) },
+    read: (scene, viewer) => scene.class ?? usualClasses(scene, viewer),
+    write: (classes, scene, viewer) => ({ class: areEqual(classes, usualClasses(scene, viewer)) ? null : classes }) },
   { key: 'returns', label: 'Returns', kind: 'select', isVisible: (_, { info }) => info.has_returns,
     help: 'Shows only these returns of each laser pulse; only: of pulses that have one',
     options: () => [{ value: '', label: 'all' }, 'first', 'last', 'only'],
@@ -117,6 +120,8 @@ const backgroundColors = ({ background }) => {
 };
 const hasBackground = (...kinds) => (scene) => kinds.includes(backgroundKind(scene));
 
+const sampleLimits = ({ info }) => [1, info.limits.max_samples];
+
 export const pictureControls = [
   { key: 'exposure', label: 'Exposure', ...SLIDER, range: [-5, 5], limits: [-20, 20], step: 0.05, automatic: true, help: 'In stops' },
   { key: 'background', label: 'Background', kind: 'select',
@@ -136,8 +141,8 @@ export const pictureControls = [
   { key: 'background.bottom', sceneKey: 'background', label: 'Bottom', kind: 'color', isVisible: hasBackground('colors'),
     read: (scene) => backgroundColors(scene)[1],
     write: (bottom, scene) => ({ background: [backgroundColors(scene)[0], bottom] }) },
-  { key: 'spp', label: 'Samples per pixel', ...SLIDER, range: [1, 256], limits: [1, 65536], scale: 'logarithmic', step: 1, help: 'Camera rays per pixel of the finished picture' },
-  { key: 'light_samples', label: 'Light samples', ...SLIDER, range: [1, 256], limits: [1, 65536], scale: 'logarithmic', step: 1, help: 'Rays per hit toward the sky and a soft sun' },
+  { key: 'spp', label: 'Samples per pixel', ...SLIDER, range: [1, 256], limits: sampleLimits, scale: 'logarithmic', step: 1, help: 'Camera rays per pixel of the finished picture' },
+  { key: 'light_samples', label: 'Light samples', ...SLIDER, range: [1, 256], limits: sampleLimits, scale: 'logarithmic', step: 1, help: 'Rays per hit toward the sky and a soft sun' },
   { key: 'max_depth', label: 'Max bounces', ...SLIDER, range: [0, 32], limits: [0, 64], step: 1, help: 'Maximum number of reflections and refractions' },
 ];
 

@@ -175,7 +175,7 @@ async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {
     .into_response())
 }
 
-/// A file of points that a page has requested.
+/// A file of points or a film that a page has requested.
 async fn points(State(state): State<Arc<ServerState>>, Path(name): Path<String>) -> RouteResult {
     let missing = || Failure(StatusCode::NOT_FOUND, "there is no such file any more".into());
     let file = state.downloads.get(&name).ok_or_else(missing)?;

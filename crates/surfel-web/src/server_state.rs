@@ -95,6 +95,7 @@ impl ServerState {
         info["limits"] = json!({
             "max_pixels": self.limits.max_view_pixels,
             "max_save_pixels": self.limits.max_save_pixels,
+            "max_samples": self.limits.max_samples,
             "max_message_bytes": self.limits.max_message_bytes,
             "max_added_file_bytes": self.limits.max_added_file_bytes,
         });

@@ -280,11 +280,21 @@ fn frame_at(
 ) -> Result<RenderedImage> {
     let quiet = CancelOnly(progress);
     scene.fix_overlay();
-    scene.seek(time_secs, &quiet)?;
+    seek(scene, time_secs, &quiet)?;
+    Ok(scene.render_with(&quiet)?.0)
+}
+
+/// Moves everything to a time in seconds, and turns it if the description has a turntable.
+///
+/// # Errors
+///
+/// Fails if a file of a sequence cannot be read, and if cancelled.
+pub fn seek(scene: &mut BuiltScene, time_secs: f64, progress: &dyn Progress) -> Result<()> {
+    scene.seek(time_secs, progress)?;
     if let Some(seconds) = scene.description().output.turntable {
         scene.turn(TAU * time_secs / seconds);
     }
-    Ok(scene.render_with(&quiet)?.0)
+    Ok(())
 }
 
 /// Says that the finished frames are not lost.

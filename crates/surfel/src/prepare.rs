@@ -5,14 +5,14 @@ use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
     MemoryEstimate, check_empty, filter_cloud, report_denoise, report_normals, report_radii,
-    report_unused_of_files,
+    report_unused_of_files, report_unused_structure,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DAffine3;
 use std::sync::Arc;
 use surfel_core::points::{
-    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, STRUCTURE,
+    Denoise, Duplicates, MixedPixels, NoisePoints, Orientation, PointCloud, Preparation, STRUCTURE,
     StructureChoice, denoise, prepare, select_points,
 };
 use surfel_core::progress::Progress;
@@ -194,6 +194,7 @@ fn prepared(
     let mut preparation = Preparation {
         denoise: settings.preparation.denoise.unwrap_or(Denoise::Off),
         duplicates: settings.preparation.duplicates.unwrap_or(Duplicates::Keep),
+        noise_points: settings.preparation.noise_points.unwrap_or(NoisePoints::Keep),
         mixed_pixels: settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep),
         ..settings.preparation(seed)
     };
@@ -207,6 +208,9 @@ fn prepared(
     }
     let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
     let (has_normals, has_radii) = (columns.normals || had_normals, columns.radii || had_radii);
+    if !preparation.finds_structures(&cloud) {
+        report_unused_structure(&settings.preparation, progress);
+    }
     // Normals hold the directions of lines.
     if !has_normals {
         preparation.structure = StructureChoice::Surface;
@@ -244,19 +248,22 @@ fn without_estimates(
     Ok(cloud)
 }
 
-/// Returns the columns that were asked for; normals and radii if nothing was.
+/// Returns the columns that were asked for; normals and radii if nothing was. Structures need both.
 fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let preparation = &settings.preparation;
+    let has_structures = preparation.structure.is_some();
     let columns = Columns {
         normals: options.normals
+            || has_structures
             || preparation.estimates_normals()
             || preparation.orient.is_some_and(|orient| orient != Orientation::None),
-        radii: preparation.radius.is_some(),
+        radii: has_structures || preparation.radius.is_some(),
         variation: options.keep_variation,
     };
     let has_other_steps = preparation.subsample.is_some()
         || preparation.filters_points()
         || preparation.duplicates.is_some()
+        || preparation.noise_points.is_some()
         || preparation.mixed_pixels.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
@@ -465,5 +472,32 @@ mod tests {
         assert_eq!(prepared(None, all), (200, false));
         // Nor are they beside normals and radii.
         assert_eq!(prepare_with(two_walls(), |_| ()).0.cloud.len(), 200);
+    }
+
+    #[test]
+    fn points_of_noise_are_kept_unless_asked() {
+        let prepared = |noise_points| {
+            let mut cloud = two_walls();
+            cloud.classification = Some((0..200).map(|i| if i < 9 { 7 } else { 2 }).collect());
+            let (loaded, choices) = prepare_with(cloud, |settings| {
+                settings.duplicates = Some(Duplicates::Keep);
+                settings.noise_points = noise_points;
+            });
+            let is_reported = choices.iter().any(|choice| choice.keys == ["noise_points"]);
+            (loaded.cloud.len(), is_reported)
+        };
+        assert_eq!(prepared(None), (200, true));
+        assert_eq!(prepared(Some(NoisePoints::Keep)), (200, true));
+        assert_eq!(prepared(Some(NoisePoints::Drop)), (191, false));
+    }
+
+    #[test]
+    fn structures_that_are_asked_for_bring_normals_and_radii() {
+        let cloud = prepare_with(two_walls(), |settings| {
+            settings.structure = Some(StructureChoice::Scatter);
+            settings.subsample = Some(Subsample::First(150));
+        });
+        let cloud = cloud.0.cloud;
+        assert!(cloud.normals.is_some() && cloud.radii.is_some() && cloud.structures().is_some());
     }
 }

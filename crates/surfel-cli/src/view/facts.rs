@@ -8,7 +8,7 @@ use surfel::description::{CameraSettings, write_table};
 use surfel::resolve::{LoadedScene, coordinate_system, located_stations};
 use surfel_core::image::{class_color, class_name};
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, PointFilter};
+use surfel_core::points::{NOISE_CLASSES, PointCloud, PointFilter};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::{FileInfo, common_file_info};
@@ -35,15 +35,22 @@ pub fn stations(scene: &LoadedScene, up: Vec3) -> Vec<Value> {
     stations.collect()
 }
 
-/// The classes of all clouds with their names, colours and numbers of points.
+/// The classes of all clouds with their names, colours and numbers of points. Those of noise are hidden by default where
+/// others are shown.
 pub fn classes(scene: &LoadedScene) -> Vec<Value> {
     let mut counts = [0u64; 256];
-    let classes = scene.clouds().filter_map(|(_, cloud)| cloud.classification.as_ref());
-    classes.flatten().for_each(|class| counts[usize::from(*class)] += 1);
+    let mut hides_noise = false;
+    let is_noise = |class: &u8| NOISE_CLASSES.contains(class);
+    for classes in scene.clouds().filter_map(|(_, cloud)| cloud.classification.as_ref()) {
+        classes.iter().for_each(|class| counts[usize::from(*class)] += 1);
+        hides_noise |= !classes.iter().all(is_noise);
+    }
     let found = (0..=u8::MAX).zip(counts).filter(|(_, count)| 0 < *count);
     let described = found.map(|(class, count)| {
         let name = format!("{class} {}", class_name(class));
-        json!({ "class": class, "name": name, "color": hex(class_color(class)), "points": count })
+        let is_hidden = hides_noise && is_noise(&class);
+        let color = hex(class_color(class));
+        json!({ "class": class, "name": name, "color": color, "points": count, "is_hidden": is_hidden })
     });
     described.collect()
 }

@@ -146,7 +146,7 @@ fn at_times(folder: &Folder, text: &str, times: &[&str]) -> Vec<Vec<u8>> {
     let scene = folder.write("scene.toml", text);
     let picture = |time: &&str| {
         let path = folder.path("at.png");
-        let view = ["--camera-direction", "0,0,-1", "--camera-orthographic", "12", "--light"];
+        let view = ["--camera-direction", "0,0,-1", "--camera-orthographic=12", "--light"];
         let view = [&view[..], &["none", "--camera-focal-point", "0,0,0", "--up", "+Z"]].concat();
         succeed(&[&["render", &scene, "-o", &path, "--time", time], &view[..], &SMALL].concat());
         read_png(path).3

@@ -55,6 +55,18 @@ fn a_turntable_turns_about_the_focal_point_of_the_camera_of_the_file() {
     assert!(0 < n_seen(1) && n_seen(1).abs_diff(n_seen(3)) < 12, "{} {}", n_seen(1), n_seen(3));
 }
 
+#[test]
+fn a_picture_of_a_turntable_is_the_frame_of_its_time() {
+    let (folder, file) = site();
+    let scene = folder.write("turn.toml", "turntable = 4\n[[object]]\nfile = \"eye.gltf\"\n");
+    let [turn, picture] = ["f#.png", "a.png"].map(|name| folder.path(name));
+    succeed(&[&["animate", &scene, "-o", &turn, "--fps", "1"], &SMALL[..]].concat());
+    succeed(&[&["render", &scene, "-o", &picture, "--time", "1"], &SMALL[..]].concat());
+    assert_eq!(read_png(&picture), read_png(folder.path("f2.png")));
+    assert_ne!(shot(&folder, &[&scene]), shot(&folder, &[&scene, "--time", "1"]));
+    assert_eq!(shot(&folder, &[&scene]), shot(&folder, &[&file]));
+}
+
 /// Returns the points of a room of 6 x 4 x 2.5 m with red walls and a red ceiling, a green floor and a green table.
 fn room() -> String {
     let (red, green) = ("200 0 0", "0 200 0");

@@ -77,7 +77,7 @@ fn render_accepts_all_surfaces_and_colors() {
     let lights = ["sun", "sky", "headlight", "sun,sky,headlight", "none"];
     assert!(all_differ(&lights.map(|light| render(&["--light", light, "--sun-angle", "0"]))));
     render(&["--camera-orthographic", "--camera-direction", "0,0,-1"]);
-    render(&["--camera-orthographic", "3", "--up", "-Y", "--exposure", "-1"]);
+    render(&["--camera-orthographic=3", "--up", "-Y", "--exposure", "-1"]);
     render(&["--camera-panorama"]);
     render(&["--camera-panorama", "--camera-position", "0,0,0.2", "--camera-azimuth-angle", "30"]);
     render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
@@ -288,6 +288,11 @@ fn info_counts_triangles_and_points_without_position() {
     let cloud = folder.write("a.xyz", "1 2 3\nnan 5 6\n7 8 9\n");
     let table = succeed(&["info", &cloud]);
     assert!(table.contains("1 of them without a position"), "{table}");
+    let nowhere = folder.write("b.xyz", "nan 5 6\nnan 5 7\n");
+    let table = succeed(&["info", &nowhere]);
+    assert!(table.contains("bounds        none: no point has a position"), "{table}");
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &nowhere])).unwrap();
+    assert_eq!(info["bounds"], Value::Null);
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn materials_of_the_command_line_apply_to_objects() {
 fn meshes_without_light_show_their_colours() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(1.0, 0.0, [128, 64, 200]));
-    let view = ["--camera-direction", "0,0,-1", "--camera-orthographic", "1"];
+    let view = ["--camera-direction", "0,0,-1", "--camera-orthographic=1"];
     let picture = folder.path("a.png");
     let arguments = [&["render", &mesh, "-o", &picture, "--light", "none"], &SMALL[..2], &view];
     succeed(&arguments.concat());
@@ -78,8 +78,7 @@ fn materials_without_light_show_their_colours() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(1.0, 0.0, [255, 255, 255]));
     let light = folder.write("light.hdr", light_picture());
-    let view =
-        ["--camera-direction", "0,0,-1", "--camera-orthographic", "1", "--background", "#000"];
+    let view = ["--camera-direction", "0,0,-1", "--camera-orthographic=1", "--background", "#000"];
     let is_all = |color: [u8; 3], options: &[&str]| {
         let picture = folder.path("a.png");
         let dark = ["render", &mesh, "-o", &picture, "--light", "none", "--exposure", "0"];

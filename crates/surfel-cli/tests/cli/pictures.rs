@@ -112,7 +112,7 @@ fn points_have_the_size_that_is_given_or_chosen() {
         "{report}"
     );
     assert_eq!(chosen, covered(&["--point-size", "8"]).0);
-    let (.., orthographic) = covered(&["--point-size", "4", "--camera-orthographic", "20"]);
+    let (.., orthographic) = covered(&["--point-size", "4", "--camera-orthographic=20"]);
     assert!(!orthographic.contains("error"), "{orthographic}");
 }
 

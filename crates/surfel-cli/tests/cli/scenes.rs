@@ -149,7 +149,11 @@ fn a_flag_does_not_consume_the_file_after_it() {
     let flag = scene("flag.toml", "camera.orthographic = true");
     assert_eq!(shot(&folder, &[&flag]), plain);
     let output = folder.path("a.png");
-    for words in [&[flag.as_str(), "-o", &output][..], &["-o", &output, "--", &flag]] {
+    for words in [
+        &[flag.as_str(), "-o", &output][..],
+        &["-o", &output, "--", &flag],
+        &["--camera-orthographic", &flag, "-o", &output],
+    ] {
         succeed(&[&["-q", "render"], &SMALL[..], words].concat());
     }
     let off = scene("off.toml", "camera.orthographic = false");

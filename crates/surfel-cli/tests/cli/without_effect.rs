@@ -25,6 +25,14 @@ fn options_that_a_file_cannot_hold_are_warned_of() {
         ("a.png", &["--dpi", "200"], &["stated in the file alone: without a scale"]),
         ("a.tif", &["--bit-depth", "16", "--no-background"], &[]),
         ("a.png", &["--dpi", "200", "--bit-depth", "8"], &["stated in the file alone"]),
+        (
+            "a.exr",
+            &["--legend", "--scale-bar", "--north", "--caption", "May"],
+            &[
+                "no effect on .exr: nothing is drawn over its layers [--legend, --scale-bar, --north, --caption]",
+            ],
+        ),
+        ("a.exr", &["--legend=false"], &[]),
     ] {
         let picture = folder.path(name);
         let arguments = [&["render", &cloud, "-o", &picture], &SMALL[..], options].concat();
@@ -61,6 +69,11 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
         (&["--point-size", "8"][..], "points [--point-size, --surface]"),
         (&["--reach", "3"], "splat-fit [--reach, --surface]"),
         (&["--density", "3", "--surface", "disc"], "cylinder [--density, --surface]"),
+        (&["--align", "each"], "for the surface splat [--align, --surface]"),
+        (&["--gather-limit", "nearest"], "splat-fit and cylinder [--gather-limit, --surface]"),
+        (&["--min-distance", "1", "--surface", "sphere"], "gaussian [--min-distance, --surface]"),
+        (&["--structure", "scatter", "--radius", "0.1"], "deform [--structure, --radius]"),
+        (&["--structure", "auto", "--radius", "median"], "deform [--structure, --radius]"),
         (&["--cmap", "turbo"], "[--cmap, --color]"),
         (&["--cmap", "turbo", "--range", "0,1", "--color", "red"], "[--cmap, --range, --color]"),
         (&["--light", "none", "--sun-elevation", "10"], "no sun shines [--sun-elevation, --light]"),
@@ -78,6 +91,9 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
         &["--reach", "3", "--surface", "mls"],
         &["--cmap", "turbo", "--range", "0,1", "--color", "elevation"],
         &["--sun-elevation", "10", "--sky-strength", "2"],
+        &["--align", "each", "--gather-limit", "nearest", "--surface", "splat"],
+        &["--min-distance", "1", "--structure", "scatter"],
+        &["--structure", "surface", "--radius", "0.1"],
     ] {
         assert_eq!(render(&ply, options), [""; 0], "{options:?}");
     }
@@ -85,6 +101,14 @@ fn options_for_other_files_and_surfaces_are_warned_of() {
     assert_eq!(render(&text, &columns), [""; 0]);
     assert_eq!(render(&ply, &["--surface", "points", "--material", "unlit"]), [""; 0]);
     let prepared = folder.path("b.ply");
-    let found = warnings(&[&["prepare", &ply, "-o", &prepared], &columns[..]].concat());
-    assert!(found.len() == 1 && found[0].contains("[--columns]"), "{found:?}");
+    let prepare =
+        |options: &[&str]| warnings(&[&["prepare", &ply, "-o", &prepared], options].concat());
+    for (options, ends) in [
+        (&columns[..], "[--columns]"),
+        (&["--structure", "scatter", "--radius", "0.1"], "[--structure, --radius]"),
+    ] {
+        let found = prepare(options);
+        assert!(found.len() == 1 && found[0].ends_with(ends), "{found:?}");
+    }
+    assert_eq!(prepare(&["--structure", "scatter"]), [""; 0]);
 }

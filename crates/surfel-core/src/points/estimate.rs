@@ -38,13 +38,7 @@ impl Missing {
             None => preparation.estimates_normals,
         };
         let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
-        // Points that move may change their structure.
-        let structure = cloud.radii.is_none()
-            && cloud.morphs.is_empty()
-            && cloud.skin.is_none()
-            && cloud.structures().is_none()
-            && preparation.structure != StructureChoice::Surface
-            && preparation.radius.rank().is_some();
+        let structure = preparation.finds_structures(cloud);
         let is_searched = structure && preparation.structure == StructureChoice::Auto;
         let fits = normals || preparation.keep_variation || is_searched;
         Self { normals, fits, radii, structure }

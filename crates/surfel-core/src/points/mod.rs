@@ -35,7 +35,8 @@ mod prepare;
 #[cfg(test)]
 mod test_clouds;
 
-pub use cleaning::clean::{CleanReport, Duplicates, clean};
+pub use cleaning::clean::{CleanReport, NOISE_CLASSES, clean};
+pub use cleaning::clean_options::{CleanOptions, Duplicates, NoisePoints};
 pub use cleaning::outliers::{OutlierRemoval, remove_outliers};
 pub use cleaning::subsample::{Subsample, subsample};
 pub use cloud::color_bits::{COLOR_8_TO_16, have_8_bits, to_8_bits};
@@ -48,6 +49,7 @@ pub use cloud::gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
+pub use cloud::known_column::{KnownColumn, plain_name};
 pub use cloud::merge::merge;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};

@@ -1,6 +1,7 @@
 //! Settings of the preparation of a cloud.
 
-use super::cleaning::clean::Duplicates;
+use super::PointCloud;
+use super::cleaning::clean_options::{Duplicates, NoisePoints};
 use super::cleaning::outliers::OutlierRemoval;
 use super::cleaning::subsample::Subsample;
 use super::denoising::denoise::Denoise;
@@ -19,6 +20,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 pub struct Preparation {
     /// The choice whether duplicates are dropped.
     pub duplicates: Duplicates,
+    /// The choice whether points are dropped that are no measurement of a surface.
+    pub noise_points: NoisePoints,
     /// ASPRS classes of noise whose points are kept.
     pub kept_noise: Vec<u8>,
     /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
@@ -56,6 +59,7 @@ impl Default for Preparation {
     fn default() -> Self {
         Self {
             duplicates: Duplicates::default(),
+            noise_points: NoisePoints::default(),
             kept_noise: Vec::new(),
             mixed_pixels: MixedPixels::default(),
             subsample: None,
@@ -76,6 +80,15 @@ impl Default for Preparation {
 }
 
 impl Preparation {
+    /// Returns true if some points of a cloud may be lines or scatter that the cloud does not state itself.
+    pub fn finds_structures(&self, cloud: &PointCloud) -> bool {
+        let has_own = cloud.radii.is_some() || cloud.structures().is_some();
+        // Points that move may change their structure.
+        let moves = !cloud.morphs.is_empty() || cloud.skin.is_some();
+        let is_chosen = self.structure != StructureChoice::Surface;
+        !has_own && !moves && is_chosen && self.radius.rank().is_some()
+    }
+
     /// Checks the settings.
     ///
     /// # Errors

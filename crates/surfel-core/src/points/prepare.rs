@@ -18,7 +18,7 @@ use super::radii::radius::{Radius, RadiusReport};
 use super::scan::scan_rings::ScanRings;
 use super::select_points::{Selection, select};
 use super::structure::elevation_grid::elevation_grid;
-use super::structure::point_shape::{Structure, StructureChoice, StructureReport};
+use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
 use super::{PointCloud, PreparedCloud};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -73,19 +73,11 @@ pub fn prepare(
         &Preparation { free_space: preparation.free_space && !is_thinned, ..preparation.clone() };
     let missing = Missing::any(&cloud, preparation);
     let rings = if missing.fits { ScanRings::find(&cloud, progress)? } else { None };
-    if let Some(ScanRings { rings, .. }) = &rings
-        && missing.structure
-        && preparation.structure == StructureChoice::Auto
-    {
-        let line = format!("{} of a spinning scanner", counted(rings.len(), "ring"));
-        progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
-    }
+    let finds_structures = missing.structure && preparation.structure == StructureChoice::Auto;
     // Denoising moves points off the grid.
-    let is_auto = missing.structure && preparation.structure == StructureChoice::Auto;
-    let grid = is_auto.then(|| elevation_grid(&cloud.positions)).flatten();
-    if let Some([n_columns, n_rows]) = grid {
-        let line = format!("one point for each cell of a grid of {n_columns}x{n_rows}: a surface");
-        progress.choice(&line, &["structure"]);
+    let grid = finds_structures.then(|| elevation_grid(&cloud.positions)).flatten();
+    if finds_structures {
+        report_pattern(rings.as_ref(), grid, progress);
     }
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
@@ -135,14 +127,9 @@ pub fn prepare(
         orient_given_normals(&mut cloud, preparation.orientation, progress)?;
     }
     if let Some((mut radii, mut found)) = radii {
-        if let (Radius::Curvature { k }, Some(normals)) = (preparation.radius, &cloud.normals) {
-            let by_curvature = radii_by_curvature(&cloud.positions, normals, &radii, k, progress)?;
-            let is_surface = |i: usize| {
-                shapes.as_ref().is_none_or(|(all, _)| all[i].structure == Structure::Surface)
-            };
-            let radius =
-                |(i, (radius, by_curvature))| if is_surface(i) { by_curvature } else { radius };
-            radii = radii.into_iter().zip(by_curvature).enumerate().map(radius).collect();
+        if let Radius::Curvature { k } = preparation.radius {
+            let shapes = shapes.as_ref().map(|(shapes, _)| shapes.as_slice());
+            follow_curvature(&cloud, k, shapes, &mut radii, progress)?;
             found.update(&radii);
         }
         add_radii(&mut cloud, radii);
@@ -154,6 +141,37 @@ pub fn prepare(
     }
     add_morph_offsets(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
+}
+
+/// Reports the rings of a spinning scanner and the grid of elevations that the search for structures follows.
+fn report_pattern(rings: Option<&ScanRings>, grid: Option<[usize; 2]>, progress: &dyn Progress) {
+    if let Some(ScanRings { rings, .. }) = rings {
+        let line = format!("{} of a spinning scanner", counted(rings.len(), "ring"));
+        progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
+    }
+    if let Some([n_columns, n_rows]) = grid {
+        let line = format!("one point for each cell of a grid of {n_columns}x{n_rows}: a surface");
+        progress.choice(&line, &["structure"]);
+    }
+}
+
+/// Reduces the radii of points of surfaces where their surface bends, if normals tell how much.
+fn follow_curvature(
+    cloud: &PointCloud,
+    k: usize,
+    shapes: Option<&[PointShape]>,
+    radii: &mut [f32],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let Some(normals) = &cloud.normals else { return Ok(()) };
+    let by_curvature = radii_by_curvature(&cloud.positions, normals, radii, k, progress)?;
+    let is_surface = |i: usize| shapes.is_none_or(|all| all[i].structure == Structure::Surface);
+    for (i, (radius, by_curvature)) in radii.iter_mut().zip(by_curvature).enumerate() {
+        if is_surface(i) {
+            *radius = by_curvature;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

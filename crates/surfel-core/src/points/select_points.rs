@@ -2,6 +2,7 @@
 
 use super::PointCloud;
 use super::cleaning::clean::{CleanReport, clean};
+use super::cleaning::clean_options::CleanOptions;
 use super::cleaning::outliers::remove_outliers;
 use super::cleaning::subsample::subsample;
 use super::preparation::Preparation;
@@ -45,8 +46,9 @@ pub(crate) fn select(
     preparation: &Preparation,
     progress: &dyn Progress,
 ) -> Result<Selection> {
-    let (mut cloud, report) =
-        clean(cloud, preparation.duplicates, &preparation.kept_noise, progress)?;
+    let Preparation { duplicates, noise_points, kept_noise, .. } = preparation;
+    let options = CleanOptions { duplicates: *duplicates, noise_points: *noise_points, kept_noise };
+    let (mut cloud, report) = clean(cloud, &options, progress)?;
     if preparation.mixed_pixels == MixedPixels::Drop
         && let Some(kept) = without_mixed_pixels(&cloud, progress)?
     {

@@ -28,8 +28,8 @@ pub enum SurfaceKind {
     /// All discs within one radius behind the nearest are blended, with normals first turned to one side, by the rule
     /// `Align`.
     Splat,
-    /// All discs within two radii behind the nearest are blended; the normal is that of a plane fitted to
-    /// their centres.
+    /// Discs of twice the radius are blended, the 16 on the ray that are nearest to the hit; the normal is that of a plane
+    /// fitted to their centres. It needs no normals: without them discs face the ray.
     SplatFit,
     /// A ray is a cylinder: position, normal and colour are means over all points in a short part of it behind the
     /// first disc that it pierces (Schaufler and Jensen, Ray Tracing Point Sampled Geometry, 2000).

@@ -80,46 +80,19 @@ pub(crate) fn read(
     let layout_of = |_: &[u8]| layout(&columns, options);
     let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
-    let n_invalid = AtomicU64::new(0);
     let mut n_points = 0;
-    let mut padding_budget =
-        BASE_PADDING.saturating_add(MAX_PADDING_PER_BYTE.saturating_mul(input.len() as u64));
     let n_claimed =
         document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));
+    let padding_budget =
+        BASE_PADDING.saturating_add(MAX_PADDING_PER_BYTE.saturating_mul(input.len() as u64));
+    let n_invalid = AtomicU64::new(0);
+    let mut reading = Reading { pages, roles: &roles, n_claimed, padding_budget, n_invalid };
     progress.begin(&format!("read {}", input.name), n_claimed);
     for (scan, description) in scans.iter().zip(&document.scans) {
         let n_before = builder.n_points();
         if 0 < scan.n_points {
-            let lengths = scan.stream_lengths();
             let section = description.file_offset;
-            let streams = find_streams(&mut salvage, pages, section, &lengths, progress)?;
-            let n_readable = scan.n_readable(&streams);
-            if n_readable < scan.n_points {
-                let location = Location::Byte(section);
-                salvage.accept(input.truncated(location, n_readable, scan.n_points))?;
-            }
-            n_points += n_readable;
-            // Without a limit, the many columns of a scan of one point would make a small file ask for any memory.
-            let n_lacking = roles.iter().filter(|role| !scan.has_column(role)).count() as u64;
-            let padding = n_readable.saturating_mul(8 * n_lacking);
-            let left = padding_budget.checked_sub(padding);
-            padding_budget = left.ok_or_else(|| Error::OutOfMemory {
-                file: input.name.to_string(),
-                n_points: n_claimed,
-            })?;
-            let firsts: Vec<u64> = (0..n_readable).step_by(POINTS_PER_BLOCK as usize).collect();
-            for batch in firsts.chunks(BLOCKS_PER_BATCH) {
-                let decode = |first: &u64| {
-                    progress.check()?;
-                    let n_points = POINTS_PER_BLOCK.min(n_readable - first);
-                    let records = scan.decode(&streams, pages, *first, n_points as usize, &roles);
-                    let n_valid = (records.len() / (8 * (3 + roles.len()))) as u64;
-                    n_invalid.fetch_add(n_points - n_valid, Ordering::Relaxed);
-                    progress.advance(n_points);
-                    Ok::<_, Error>(records)
-                };
-                builder.append(&batch.par_iter().map(decode).collect::<Result<Vec<_>>>()?)?;
-            }
+            n_points += reading.append(scan, section, &mut builder, &mut salvage, progress)?;
         }
         n_scan_points.push(builder.n_points() - n_before);
     }
@@ -127,7 +100,7 @@ pub(crate) fn read(
     let n_claimed = document.is_described.then_some(n_claimed);
     salvage.report("point", n_points, n_claimed, progress)?;
     info.n_points = Some(n_points);
-    let n_invalid = n_invalid.into_inner();
+    let n_invalid = reading.n_invalid.into_inner();
     if 0 < n_invalid {
         let line =
             format!("skipped {n_invalid} of {}: no valid position", counted(n_points, "point"));
@@ -144,6 +117,61 @@ pub(crate) fn read(
         progress.note(&format!("{}: {line}", input.name));
     }
     Ok(Loaded { cloud, info })
+}
+
+/// State that the scans of a file share while they are read.
+struct Reading<'a> {
+    pages: Pages<'a>,
+    /// The columns to read.
+    roles: &'a [ColumnRole],
+    /// Number of points of all scans that the file states.
+    n_claimed: u64,
+    /// Bytes that are left for columns that only other scans have.
+    padding_budget: u64,
+    /// Number of points without a valid position.
+    n_invalid: AtomicU64,
+}
+
+impl Reading<'_> {
+    /// Appends the points of a scan whose values begin at the byte `section`; returns how many could be read.
+    fn append<F: Fn(&[u8]) -> RecordLayout>(
+        &mut self,
+        scan: &Scan,
+        section: u64,
+        builder: &mut CloudBuilder<F>,
+        salvage: &mut Salvage,
+        progress: &dyn Progress,
+    ) -> Result<u64> {
+        let (input, pages, roles) = (salvage.input, self.pages, self.roles);
+        let streams = find_streams(salvage, pages, section, &scan.stream_lengths(), progress)?;
+        let n_readable = scan.n_readable(&streams);
+        if n_readable < scan.n_points {
+            let location = Location::Byte(section);
+            salvage.accept(input.truncated(location, n_readable, scan.n_points))?;
+        }
+        // Without a limit, the many columns of a scan of one point would make a small file ask for any memory.
+        let n_lacking = roles.iter().filter(|role| !scan.has_column(role)).count() as u64;
+        let padding = n_readable.saturating_mul(8 * n_lacking);
+        let left = self.padding_budget.checked_sub(padding);
+        self.padding_budget = left.ok_or_else(|| Error::OutOfMemory {
+            file: input.name.to_string(),
+            n_points: self.n_claimed,
+        })?;
+        let decode = |first: &u64| {
+            progress.check()?;
+            let n_points = POINTS_PER_BLOCK.min(n_readable - first);
+            let records = scan.decode(&streams, pages, *first, n_points as usize, roles);
+            let n_valid = (records.len() / (8 * (3 + roles.len()))) as u64;
+            self.n_invalid.fetch_add(n_points - n_valid, Ordering::Relaxed);
+            progress.advance(n_points);
+            Ok::<_, Error>(records)
+        };
+        let firsts: Vec<u64> = (0..n_readable).step_by(POINTS_PER_BLOCK as usize).collect();
+        for batch in firsts.chunks(BLOCKS_PER_BATCH) {
+            builder.append(&batch.par_iter().map(decode).collect::<Result<Vec<_>>>()?)?;
+        }
+        Ok(n_readable)
+    }
 }
 
 /// Returns the scans; fails if one has no coordinates or too many fields.

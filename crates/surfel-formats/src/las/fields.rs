@@ -1,10 +1,10 @@
 //! The fields of the columns in the records of each point format, extra bytes included.
 
-use surfel_core::points::WITHHELD;
+use surfel_core::points::{WITHHELD, plain_name};
 
 use super::header::{Header, RECORD_LENGTHS, read_f64, text};
 use crate::file::Input;
-use crate::table::{ColumnField, ColumnRole, Field, NumberType, plain_name};
+use crate::table::{ColumnField, ColumnRole, Field, NumberType};
 
 /// User id of the record that describes the extra bytes.
 pub(super) const EXTRA_BYTES_USER_ID: &str = "LASF_Spec";

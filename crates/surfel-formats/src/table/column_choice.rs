@@ -1,8 +1,8 @@
 //! The columns to read from a file, chosen by the caller.
 
-use surfel_core::points::{PointCloud, STATION};
+use surfel_core::points::{PointCloud, STATION, plain_name};
 
-use super::column_role::{ColumnRole, plain_name};
+use super::column_role::ColumnRole;
 
 /// The columns to keep in memory; positions are always kept.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -18,7 +18,7 @@ pub use column_choice::{Column, ColumnChoice, TextColumn};
 pub(crate) use chunks::{ParseFault, TextChunk, line_at, parse_chunks};
 pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
-pub(crate) use column_role::{ColumnRole, plain_name};
+pub(crate) use column_role::ColumnRole;
 pub(crate) use column_slices::{ColumnSlices, shrink};
 pub(crate) use encode::{
     POINTS_PER_CHUNK, decimal_step, encode_points, note_rounded_colors, scalar_word,

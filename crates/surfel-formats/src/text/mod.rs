@@ -9,6 +9,7 @@ mod write;
 
 pub(crate) use write::write;
 
+use surfel_core::points::KnownColumn;
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 
@@ -345,5 +346,5 @@ fn file_info(preamble: &Preamble) -> FileInfo {
 fn has_longitudes(names: &[String]) -> bool {
     let roles = roles_of_names(names);
     let x = roles.iter().position(|role| *role == ColumnRole::Position(0));
-    x.is_some_and(|x| ColumnRole::is_longitude(&names[x]))
+    x.is_some_and(|x| KnownColumn::is_longitude(&names[x]))
 }

@@ -87,9 +87,9 @@ struct Session {
     out: mpsc::Sender<Outgoing>,
     /// One permit for each question about points that is being answered.
     queries: Arc<Semaphore>,
-    /// The permit for the saved picture or file of points that is being made; others of the page wait for it.
+    /// The permit for the saved picture, film or file of points that is being made; others of the page wait for it.
     save_permit: Arc<Semaphore>,
-    /// The cancellation flags of saved pictures and files of points that are not sent completely, by request id.
+    /// The cancellation flags of saved pictures, films and files of points that are not sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
     /// The file of points and the film that the page requested last, by the words for what is in them.
     downloads: Arc<Mutex<HashMap<&'static str, DownloadGuard>>>,

@@ -27,6 +27,7 @@ mod picture;
 mod place;
 mod plan;
 mod point_filter;
+mod preparation_rule;
 pub mod rule;
 mod section;
 mod table;

@@ -6,18 +6,19 @@ use super::color_rule::{ColorSourceRule, ColormapRule};
 use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
 use super::point_filter::{Classes, RETURNS, Returns, point_filters};
-use super::rule::{
-    Checked, ColumnNames, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, number, parsed,
+use super::preparation_rule::{
+    DENOISE, DUPLICATES, MIXED_PIXELS, NOISE_POINTS, RadiusRule, SubsampleRule, method_name,
+    orientation_text,
 };
+use super::rule::{ColumnNames, Flag, Interval, OneOf, POSITIVE, Text, count, number, parsed};
 use super::section::{Part, Section};
 use serde_json::Value;
-use std::path::Path;
 use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    COLUMN_INDEX, DEFAULT_RADIUS_SAMPLES, Denoise, Duplicates, GAUSSIAN_COLUMNS, MAX_REST_COLUMNS,
-    MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE, PointFilter, Preparation, ROW_INDEX,
+    COLUMN_INDEX, Denoise, Duplicates, GAUSSIAN_COLUMNS, MAX_REST_COLUMNS, MixedPixels,
+    NoisePoints, Orientation, OutlierRemoval, POINT_SOURCE, PointFilter, Preparation, ROW_INDEX,
     Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample, WITHHELD,
     rest_column,
 };
@@ -68,14 +69,6 @@ settings! {
     }
 }
 
-const DENOISE: &[(&str, Denoise)] =
-    &[("auto", Denoise::Auto), ("on", Denoise::On), ("off", Denoise::Off)];
-
-const DUPLICATES: &[(&str, Duplicates)] = &[("drop", Duplicates::Drop), ("keep", Duplicates::Keep)];
-
-const MIXED_PIXELS: &[(&str, MixedPixels)] =
-    &[("drop", MixedPixels::Drop), ("keep", MixedPixels::Keep)];
-
 settings! {
     /// The reduction and completion of points before they become a surface.
     pub struct PreparationSettings {
@@ -95,6 +88,9 @@ settings! {
         /// Points at exactly the same position with about the same normal: drop all but the first, or keep them
         /// [default: drop, keep for surfel prepare].
         duplicates: Duplicates, OneOf(DUPLICATES), "CHOICE";
+        /// Points of classes of noise (7 and 18), those flagged withheld, and ten or more at exactly 0, 0, 0: drop or keep
+        /// them [default: drop, keep for surfel prepare].
+        noise_points: NoisePoints, OneOf(NOISE_POINTS), "CHOICE";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
@@ -206,6 +202,7 @@ impl ObjectSettings {
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
             duplicates: settings.duplicates.unwrap_or(default.duplicates),
+            noise_points: settings.noise_points.unwrap_or(default.noise_points),
             kept_noise: settings.class.clone().unwrap_or_default(),
             mixed_pixels: settings.mixed_pixels(),
             subsample: settings.subsample,
@@ -427,77 +424,5 @@ impl PreparationSettings {
         if self.radius.is_some() {
             cloud.radii = None;
         }
-    }
-}
-
-/// A subsample of at least one point; the library itself also takes 0.
-struct SubsampleRule;
-
-impl Rule<Subsample> for SubsampleRule {
-    fn read(&self, value: &Value, folder: &Path) -> Result<Subsample, Invalid> {
-        match parsed(Subsample::to_string).read(value, folder)? {
-            Subsample::First(0) | Subsample::Random(0) => {
-                Err(Invalid::new("expected at least one point"))
-            }
-            choice => Ok(choice),
-        }
-    }
-
-    fn write(&self, value: &Subsample) -> Value {
-        Value::String(value.to_string())
-    }
-}
-
-/// A length, which may be a number, or a rule.
-struct RadiusRule;
-
-const LENGTH: Checked = Checked { expected: "a positive length", ..POSITIVE };
-
-impl Rule<Radius> for RadiusRule {
-    fn read(&self, value: &Value, folder: &Path) -> Result<Radius, Invalid> {
-        if value.is_number() {
-            LENGTH.read(value, folder)?;
-        }
-        parsed(radius_text).read(value, folder)
-    }
-
-    fn write(&self, value: &Radius) -> Value {
-        match value {
-            // The shortest digits of the f32, not those of the f64 that it becomes.
-            Radius::Fixed(length) => {
-                serde_json::json!(length.to_string().parse::<f64>().unwrap_or(0.0))
-            }
-            other => Value::String(radius_text(other)),
-        }
-    }
-}
-
-fn radius_text(radius: &Radius) -> String {
-    match radius {
-        Radius::Fixed(length) => length.to_string(),
-        Radius::Median { n, samples: DEFAULT_RADIUS_SAMPLES } => format!("median:{n}"),
-        Radius::Median { n, samples } => format!("median:{n},{samples}"),
-        Radius::Adaptive { k } => format!("adaptive:{k}"),
-        Radius::Curvature { k } => format!("curvature:{k}"),
-    }
-}
-
-fn method_name(method: &NeighborMethod) -> String {
-    match method {
-        NeighborMethod::Grid => "grid".into(),
-        NeighborMethod::ScanLine => "scan-line".into(),
-        NeighborMethod::Knn => "knn".into(),
-    }
-}
-
-fn orientation_text(orientation: &Orientation) -> String {
-    match orientation {
-        Orientation::None => "none".into(),
-        Orientation::Auto => "auto".into(),
-        Orientation::ScanAngle => "scan-angle".into(),
-        Orientation::Station => "station".into(),
-        Orientation::Up => "up".into(),
-        Orientation::SpanningTree => "mst".into(),
-        Orientation::Viewpoint(point) => format!("viewpoint:{},{},{}", point.x, point.y, point.z),
     }
 }

@@ -37,10 +37,8 @@ pub trait Rule<T> {
 pub enum Arity {
     /// One value.
     One,
-    /// One value or none, which means `true`.
-    Optional,
     /// One value or none, which means `true`. The value is joined to the key, so that the next word is none.
-    Flag,
+    Optional,
 }
 
 /// Coordinates, lengths and factors stay below this: beyond, their squares are not finite in f32.
@@ -168,7 +166,7 @@ impl Rule<bool> for Flag {
     }
 
     fn arity(&self) -> Arity {
-        Arity::Flag
+        Arity::Optional
     }
 }
 

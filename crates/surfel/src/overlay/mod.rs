@@ -176,7 +176,7 @@ pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Inval
     let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
     let fault = |key: &str| {
         let advice = match is_orthographic {
-            false => "needs a camera without perspective [camera.orthographic]",
+            false => "needs a camera without perspective [camera.orthographic, gsd]",
             true => "north is along the view; look down, as along 0,0,-1 [camera.direction]",
         };
         Invalid::at(key, advice)
@@ -375,7 +375,7 @@ mod tests {
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
         let (picture, _) = everything();
         let error = faults(&picture, &camera, Vec3::Z).remove(0);
-        assert!(error.to_string().ends_with("[camera.orthographic]"), "{error}");
+        assert!(error.to_string().ends_with("[camera.orthographic, gsd]"), "{error}");
         assert_eq!(error.path, "scale_bar");
     }
 }

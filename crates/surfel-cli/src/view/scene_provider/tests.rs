@@ -45,6 +45,25 @@ fn what_was_read_decides_whether_an_object_is_a_cloud() {
 }
 
 #[test]
+fn classes_of_noise_are_hidden_where_others_are_shown() {
+    let hidden = |classes: [u8; 2]| {
+        let classification = (0..400).map(|i| classes[i % 2]).collect();
+        let cloud = PointCloud {
+            classification: Some(classification),
+            ..PointCloud::from_positions(corners())
+        };
+        let mut startup = SceneDescription::of_files(["memory:0:cloud"]);
+        let content = MemoryContent::Points(Arc::new(cloud), None);
+        startup.memory.insert("memory:0:cloud", content);
+        let info = open(startup).info();
+        let classes = info["classes"].as_array().unwrap().iter();
+        classes.map(|one| one["is_hidden"] == json!(true)).collect::<Vec<_>>()
+    };
+    assert_eq!(hidden([2, 18]), [false, true]);
+    assert_eq!(hidden([7, 18]), [false, false]);
+}
+
+#[test]
 fn exported_commands_restore_defaults_that_a_scene_file_changes() {
     let mut startup = startup();
     startup.picture.spp = Some(64);

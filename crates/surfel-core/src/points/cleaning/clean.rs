@@ -1,5 +1,6 @@
 //! Cleaning: drops points and marks entries that no later step can use, and counts them.
 
+use super::clean_options::{CleanOptions, Duplicates, NoisePoints};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::points::is_valid_position;
@@ -31,17 +32,6 @@ pub struct CleanReport {
     pub n_invalid_radii: usize,
 }
 
-/// The choice whether duplicates are dropped: all but the first of points at one position. Points with different normals,
-/// as those that the faces of an edge share, are no duplicates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Duplicates {
-    /// They are dropped.
-    #[default]
-    Drop,
-    /// They stay.
-    Keep,
-}
-
 /// Minimum cosine, of any sign, between the normals of duplicates.
 const MIN_DUPLICATE_COSINE: f32 = 0.85;
 /// Maximum number of points at one position that are compared with each other.
@@ -51,10 +41,10 @@ const MAX_COMPARED: usize = 64;
 const MIN_UNMEASURED: usize = 10;
 
 /// ASPRS classes of noise: low points and high noise.
-const NOISE_CLASSES: [u8; 2] = [7, 18];
+pub const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, rays that measured nothing, points of classes of noise other than `kept_noise` and
-/// those flagged withheld unless there are no others, and duplicates if chosen, and marks unusable normals and radii.
+/// Drops points with invalid positions and, if chosen, rays that measured nothing, points of classes of noise other than
+/// those kept and points flagged withheld, unless there are no others, and duplicates; marks unusable normals and radii.
 /// Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which
 /// may have different sizes and colours.
 ///
@@ -65,16 +55,15 @@ const NOISE_CLASSES: [u8; 2] = [7, 18];
 /// Fails if there are too many points for 32-bit indices, or if `progress` is cancelled.
 pub fn clean(
     cloud: PointCloud,
-    duplicates: Duplicates,
-    kept_noise: &[u8],
+    options: &CleanOptions,
     progress: &dyn Progress,
 ) -> Result<(PointCloud, CleanReport)> {
     let mut report = CleanReport { n_points_before: cloud.len(), ..CleanReport::default() };
-    let dropped = find_dropped(&cloud, duplicates, kept_noise, progress, &mut report)?;
+    let dropped = find_dropped(&cloud, options, progress, &mut report)?;
     let mut cloud = if dropped.is_empty() { cloud } else { without(&cloud, &dropped) };
     clean_normals(&mut cloud, &mut report);
     clean_radii(&mut cloud, &mut report);
-    for line in report.lines(kept_noise) {
+    for line in report.lines(options.kept_noise) {
         progress.note(&line);
     }
     Ok((cloud, report))
@@ -103,11 +92,19 @@ impl CleanReport {
     }
 }
 
+/// The reason why a point is not shown, apart from its neighbours.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fault {
+    InvalidPosition,
+    Unmeasured,
+    Noise,
+    Withheld,
+}
+
 /// Returns the indices of the points to drop in ascending order.
 fn find_dropped(
     cloud: &PointCloud,
-    duplicates: Duplicates,
-    kept_noise: &[u8],
+    options: &CleanOptions,
     progress: &dyn Progress,
     report: &mut CleanReport,
 ) -> Result<Vec<u32>> {
@@ -120,30 +117,44 @@ fn find_dropped(
     let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
     // Points of a model may be at zero at rest.
     let unmeasured = if may_part { None } else { unmeasured_position(cloud) };
-    let is_unmeasured = |i: u32| unmeasured == Some(positions[i as usize]);
-    let is_invalid = |i: u32| !is_valid_position(positions[i as usize]) || is_unmeasured(i);
-    let is_noise = |class: &u8| NOISE_CLASSES.contains(class) && !kept_noise.contains(class);
+    let is_noise =
+        |class: &u8| NOISE_CLASSES.contains(class) && !options.kept_noise.contains(class);
     let noise = cloud.classification.as_deref().filter(|classes| !classes.iter().all(is_noise));
-    let is_noise = |i: u32| noise.is_some_and(|classes| is_noise(&classes[i as usize]));
-    let indices = 0..positions.len() as u32;
-    let mut dropped: Vec<u32> = indices.into_par_iter().filter(|i| is_invalid(*i)).collect();
-    let n_dropped = dropped.len();
-    report.n_unmeasured = dropped.par_iter().filter(|i| is_unmeasured(**i)).count();
-    report.n_invalid_positions = n_dropped - report.n_unmeasured;
-    let indices = 0..positions.len() as u32;
-    dropped.par_extend(indices.into_par_iter().filter(|i| !is_invalid(*i) && is_noise(*i)));
-    report.n_noise = dropped.len() - n_dropped;
-    let withheld = withheld_points(cloud, |i| !is_invalid(i) && !is_noise(i));
+    let fault_before_flags = |i: u32| match positions[i as usize] {
+        position if !is_valid_position(position) => Some(Fault::InvalidPosition),
+        position if unmeasured == Some(position) => Some(Fault::Unmeasured),
+        _ if noise.is_some_and(|classes| is_noise(&classes[i as usize])) => Some(Fault::Noise),
+        _ => None,
+    };
+    let withheld = withheld_points(cloud, |i| fault_before_flags(i).is_none());
     let is_withheld = |i: u32| withheld.is_some_and(|flags| flags.get(i as usize) != 0.0);
-    let indices = 0..positions.len() as u32;
-    let is_unseen = |i: &u32| !is_invalid(*i) && !is_noise(*i) && is_withheld(*i);
-    dropped.par_extend(indices.into_par_iter().filter(is_unseen));
-    report.n_withheld = dropped.len() - n_dropped - report.n_noise;
+    let fault =
+        |i: u32| fault_before_flags(i).or_else(|| is_withheld(i).then_some(Fault::Withheld));
+    let drops =
+        |fault: Fault| fault == Fault::InvalidPosition || options.noise_points == NoisePoints::Drop;
+    let is_dropped = |i: u32| fault(i).is_some_and(drops);
+    let indices = || (0..positions.len() as u32).into_par_iter();
+    let mut dropped: Vec<u32> = indices().filter(|i| is_dropped(*i)).collect();
+    let n_dropped_for = |of: Fault| dropped.par_iter().filter(|i| fault(**i) == Some(of)).count();
+    report.n_invalid_positions = n_dropped_for(Fault::InvalidPosition);
+    report.n_unmeasured = n_dropped_for(Fault::Unmeasured);
+    report.n_noise = n_dropped_for(Fault::Noise);
+    report.n_withheld = n_dropped_for(Fault::Withheld);
+    let n_kept = match options.noise_points {
+        NoisePoints::Drop => 0,
+        NoisePoints::Keep => indices().filter(|i| fault(*i).is_some_and(|of| !drops(of))).count(),
+    };
+    if 0 < n_kept {
+        let line = format!(
+            "{} kept of classes of noise, flagged withheld or at exactly 0, 0, 0",
+            counted(n_kept, "point")
+        );
+        progress.choice(&line, &["noise_points"]);
+    }
     let n_dropped = dropped.len();
     if !may_part && !cloud.has_gaussians() {
-        let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i) && !is_withheld(i);
-        let found = find_duplicates(cloud, is_candidate, progress)?;
-        match duplicates {
+        let found = find_duplicates(cloud, |i| !is_dropped(i), progress)?;
+        match options.duplicates {
             Duplicates::Drop => dropped.extend(found),
             Duplicates::Keep if found.is_empty() => {}
             Duplicates::Keep => {
@@ -278,7 +289,7 @@ mod tests {
     use crate::progress::NoProgress;
 
     fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
-        clean(cloud, Duplicates::Drop, &[], &NoProgress).unwrap()
+        clean(cloud, &CleanOptions::default(), &NoProgress).unwrap()
     }
 
     #[test]
@@ -295,7 +306,8 @@ mod tests {
     fn duplicates_stay_if_chosen() {
         let positions = vec![Vec3::X, Vec3::Y, Vec3::X, Vec3::NAN];
         let cloud = PointCloud::from_positions(positions.clone());
-        let (cloud, report) = clean(cloud, Duplicates::Keep, &[], &NoProgress).unwrap();
+        let options = CleanOptions { duplicates: Duplicates::Keep, ..CleanOptions::default() };
+        let (cloud, report) = clean(cloud, &options, &NoProgress).unwrap();
         assert_eq!(cloud.positions, positions[..3]);
         assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, 0));
     }
@@ -413,7 +425,8 @@ mod tests {
         let positions = [Vec3::X, Vec3::Y, Vec3::Z].to_vec();
         let mut cloud = PointCloud::from_positions(positions);
         cloud.classification = Some(vec![5, 7, 18]);
-        let (cloud, report) = clean(cloud, Duplicates::Drop, &[5, 7], &NoProgress).unwrap();
+        let options = CleanOptions { kept_noise: &[5, 7], ..CleanOptions::default() };
+        let (cloud, report) = clean(cloud, &options, &NoProgress).unwrap();
         assert_eq!((cloud.classification, report.n_noise), (Some(vec![5, 7]), 1));
         assert_eq!(report.lines(&[5, 7]), ["1 point dropped: class of noise 18"]);
         assert_eq!(report.lines(&[]), ["1 point dropped: classes of noise (7, 18)"]);
@@ -432,5 +445,30 @@ mod tests {
         assert_eq!((report.n_noise, report.n_withheld), (1, 1));
         let (cloud, report) = cleaned(flagged([1, 1, 0], [2, 2, 7]));
         assert_eq!((cloud.len(), report.n_noise, report.n_withheld), (2, 1, 0));
+    }
+
+    #[test]
+    fn points_that_are_no_measurement_stay_if_asked() {
+        let mut positions = vec![Vec3::ZERO; MIN_UNMEASURED];
+        positions.extend([Vec3::X, Vec3::Y, Vec3::Z, Vec3::NAN]);
+        let n = positions.len();
+        let mut classes = vec![2; n];
+        classes[n - 4] = 7;
+        let mut flags = vec![0; n];
+        flags[n - 3] = 1;
+        let cloud = PointCloud {
+            classification: Some(classes),
+            scalars: vec![Scalar { name: WITHHELD.into(), values: Values::U8(flags) }],
+            ..PointCloud::from_positions(positions.clone())
+        };
+        assert_eq!(cleaned(cloud.clone()).0.positions, [Vec3::Z]);
+        let options = CleanOptions { noise_points: NoisePoints::Keep, ..CleanOptions::default() };
+        let (kept, report) = clean(cloud.clone(), &options, &NoProgress).unwrap();
+        assert_eq!(kept.positions, positions[MIN_UNMEASURED - 1..n - 1]);
+        let n_duplicates = MIN_UNMEASURED - 1;
+        assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, n_duplicates));
+        assert_eq!((report.n_unmeasured, report.n_noise, report.n_withheld), (0, 0, 0));
+        let options = CleanOptions { duplicates: Duplicates::Keep, ..options };
+        assert_eq!(clean(cloud, &options, &NoProgress).unwrap().0.positions, positions[..n - 1]);
     }
 }

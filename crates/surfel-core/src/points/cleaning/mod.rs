@@ -2,6 +2,7 @@
 //!
 //! A file uses only those above it.
 
+pub mod clean_options;
 pub mod clean;
 pub mod subsample;
 pub mod outliers;

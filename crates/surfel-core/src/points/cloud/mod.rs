@@ -7,6 +7,7 @@ pub mod scan_station;
 pub mod point_cloud;
 pub mod color_bits;
 pub mod flags;
+pub mod known_column;
 pub mod gaussians;
 pub mod filter;
 pub mod merge;

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import contextlib
+import hashlib
 import os
 import pathlib
 import re
@@ -26,7 +27,8 @@ def render_frames(recipe, frames, *, format="png"):
 def save_frames(recipe, frames, pattern):
     """Renders frames and writes each to a file of this machine, `####` in whose name is its number from 1.
 
-    Returns the names. Files that are there already are kept, so that an interrupted film goes on.
+    Returns the names. Frames that a call with the same recipe has written are kept, so that an interrupted film goes on;
+    the file `.PATTERN.recipe` beside them lists them.
 
     Raises `InvalidSetting` for a pattern without `#`, `InaccessibleFile` if there is no such folder or a file cannot be
     written, and `ClusterLost` if the scheduler vanishes.
@@ -38,17 +40,18 @@ def save_frames(recipe, frames, pattern):
     if not os.path.isdir(folder):
         raise InaccessibleFile(f"{pattern}: cannot be written: there is no folder `{folder}`; create it first")
     names = {index: _frame_name(pattern, index) for index in frames}
-    missing = [index for index, name in names.items() if not os.path.exists(name)]
+    log = _FrameLog(pattern, recipe)
+    missing = [index for index, name in names.items() if index not in log.done or not os.path.exists(name)]
     pictures = render_frames(recipe, missing, format=pathlib.Path(pattern).suffix[1:])
     client = getattr(dask.base.get_scheduler(), "__self__", None)
     if client is None:
         # Threads and processes of this machine, which need not hand the bytes on.
         save = dask.delayed(_write)
-        dask.compute(*(save(names[index], picture) for index, picture in zip(missing, pictures)))
+        dask.compute(*(save(log.file, index, names[index], picture) for index, picture in zip(missing, pictures)))
         return list(names.values())
     try:
         for index, content in completed(client, missing, pictures):
-            _write(names[index], content)
+            _write(log.file, index, names[index], content)
     except concurrent.futures.CancelledError as error:
         raise ClusterLost() from error
     return list(names.values())
@@ -80,7 +83,41 @@ def _frame_name(pattern, index):
     return os.path.join(folder, re.sub("#+", lambda hashes: str(index + 1).zfill(len(hashes[0])), name, count=1))
 
 
-def _write(name, content):
+class _FrameLog:
+    """The frames of a pattern that are those of a recipe: a file with the recipe's hash, then the number of each frame.
+
+    A picture alone does not prove that its frame is done: it may be that of another recipe.
+    """
+
+    def __init__(self, pattern, recipe):
+        folder, name = os.path.split(pattern)
+        self.file = os.path.join(folder, f".{name}.recipe")
+        digest = hashlib.sha256(recipe._identity().encode()).hexdigest()
+        try:
+            with open(self.file, encoding="ascii", errors="replace") as file:
+                known, *numbers = file.read().split("\n")
+        except FileNotFoundError:
+            known, numbers = "", []
+        except OSError as error:
+            raise InaccessibleFile(f"{self.file}: cannot be read: {error.strerror}") from error
+        # The last line may be half a number.
+        numbers = numbers[:-1] if known == digest else []
+        self.done = {int(number) - 1 for number in numbers if number.isdecimal()}
+        lines = [digest, *(str(index + 1) for index in sorted(self.done)), ""]
+        _replace(self.file, "\n".join(lines).encode())
+
+
+def _write(log, index, name, content):
+    """Writes a frame, then its number into the log."""
+    _replace(name, content)
+    try:
+        with open(log, "a", encoding="ascii") as file:
+            file.write(f"{index + 1}\n")
+    except OSError as error:
+        raise InaccessibleFile(f"{log}: cannot be written: {error.strerror}") from error
+
+
+def _replace(name, content):
     """Writes a file beside its name first, so that no half file is ever under it."""
     beside = f"{name}.{uuid.uuid4().hex}.part"
     try:

@@ -7,7 +7,7 @@ mod shown_points;
 mod up_parts;
 mod without_effect;
 
-pub(crate) use without_effect::report_unused_of_files;
+pub(crate) use without_effect::{report_unused_of_files, report_unused_structure};
 
 use super::camera::{camera_motion, keep_named_camera};
 use super::check_files::check_files;

@@ -6,6 +6,7 @@ use crate::description::{
     ColorSettings, KeyedSettings, LightKind, PreparationSettings, SceneDescription,
     SurfaceSettings, misspelled, write_table,
 };
+use surfel_core::points::{PointCloud, StructureChoice};
 use surfel_core::progress::Progress;
 use surfel_core::render::MIN_ADAPTIVE_SAMPLES;
 use surfel_core::scene::Background;
@@ -36,6 +37,7 @@ impl LoadedScene {
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
         self.report_unused_of_points(description, progress);
+        self.report_unused_structure(description, progress);
         self.report_unused_of_surfaces(description, progress);
         report_unused_of_lights(description, progress);
     }
@@ -54,8 +56,9 @@ impl LoadedScene {
                 (surface, settings.color.color.unwrap_or_else(source))
             })
             .unzip();
-        let SurfaceSettings { reach, density, degree, octree_depth, .. } =
-            &description.objects_default.surface;
+        let settings = &description.objects_default.surface;
+        let SurfaceSettings { align, gather_limit, min_distance, .. } = settings;
+        let SurfaceSettings { reach, density, degree, octree_depth, .. } = settings;
         let is_octree =
             |kind: &SurfaceKind| [SurfaceKind::Octree, SurfaceKind::OctreeSplat].contains(kind);
         let has = |kind: SurfaceKind| surfaces.contains(&kind);
@@ -64,6 +67,12 @@ impl LoadedScene {
                 "point_size",
                 description.picture.point_size.is_some() && !has(SurfaceKind::Points),
                 "points",
+            ),
+            ("align", align.is_some() && !has(SurfaceKind::Splat), "splat"),
+            (
+                "gather_limit",
+                gather_limit.is_some() && !surfaces.iter().any(|kind| kind.blends_discs()),
+                "splat, splat-mean, splat-fit and cylinder",
             ),
             (
                 "reach",
@@ -83,6 +92,10 @@ impl LoadedScene {
                 progress.warning(&line, &[key, "surface"]);
             }
         }
+        if min_distance.is_some() && !surfaces.iter().any(|kind| kind.is_continuous()) {
+            let line = "no effect: not for the surfaces points, sphere and gaussian";
+            progress.warning(line, &["min_distance", "surface"]);
+        }
         let ColorSettings { cmap, range, .. } = &description.objects_default.color;
         let set = [("cmap", cmap.is_some()), ("range", range.is_some())];
         let mut keys: Vec<&str> =
@@ -92,6 +105,18 @@ impl LoadedScene {
             let line =
                 "no effect: maps colour values, as elevation, intensity and columns have them";
             progress.warning(line, &keys);
+        }
+    }
+
+    /// Warns of structures that are chosen but found in no cloud.
+    fn report_unused_structure(&self, description: &SceneDescription, progress: &dyn Progress) {
+        let finds_structures = |(i, cloud): (usize, &PointCloud)| {
+            let settings = self.settings_of(i, description);
+            settings.preparation(description.picture.seed()).finds_structures(cloud)
+        };
+        let settings = &description.objects_default.preparation;
+        if self.clouds().next().is_some() && !self.clouds().any(finds_structures) {
+            report_unused_structure(settings, progress);
         }
     }
 
@@ -135,6 +160,15 @@ fn report_unused_of_lights(description: &SceneDescription, progress: &dyn Progre
     }
 }
 
+/// Warns of a choice of structures that no cloud follows.
+pub(crate) fn report_unused_structure(settings: &PreparationSettings, progress: &dyn Progress) {
+    if settings.structure.is_some_and(|choice| choice != StructureChoice::Surface) {
+        let line = "no effect: structures are found only where radii are estimated from neighbours, in clouds that do not \
+                    deform";
+        progress.warning(line, &["structure", "radius"]);
+    }
+}
+
 /// Warns of settings for files of a kind that is not there, and of columns that are probably misspelled.
 pub(crate) fn report_unused_of_files<'i>(
     infos: impl IntoIterator<Item = &'i FileInfo>,
@@ -172,6 +206,19 @@ fn report_unused_of_output(description: &SceneDescription, progress: &dyn Progre
     if description.picture.bit_depth == Some(BitDepth::Sixteen) && !has_depths {
         let line = format!("no effect on .{extension}: only .png and .tif have 16 bits");
         progress.warning(&line, &["bit_depth"]);
+    }
+    let picture = &description.picture;
+    let overlays = [
+        ("legend", picture.legend()),
+        ("scale_bar", picture.scale_bar()),
+        ("north", picture.north()),
+        ("caption", picture.caption.is_some()),
+    ];
+    let drawn: Vec<&str> =
+        overlays.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
+    if extension == "exr" && !drawn.is_empty() {
+        let line = "no effect on .exr: nothing is drawn over its layers";
+        progress.warning(line, &drawn);
     }
     let backdrop = match extension {
         "jpg" | "jpeg" => Some("white"),

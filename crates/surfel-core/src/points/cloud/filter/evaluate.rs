@@ -2,7 +2,7 @@
 
 use super::condition::{Condition, Operand, Relation};
 use crate::error::{Error, Result};
-use crate::points::{COLOR_8_TO_16, PointCloud, Values};
+use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values};
 use std::ops::Range;
 
 /// The greatest channel of a colour of 8 bits. A channel that is compared with a greater number has 16 bits.
@@ -17,30 +17,9 @@ pub(super) struct Evaluation<'a> {
 /// A column of a cloud.
 #[derive(Clone, Copy)]
 enum ColumnValues<'a> {
-    Position(usize),
-    Normal(usize),
-    Color(usize),
-    Radius,
-    Intensity,
-    Classification,
+    Known(KnownColumn),
     Scalar(&'a Values),
 }
-
-/// Names of columns that are no scalars, each with its synonyms.
-const NAMES: [(&[&str], ColumnValues<'static>); 12] = [
-    (&["x", "easting"], ColumnValues::Position(0)),
-    (&["y", "northing"], ColumnValues::Position(1)),
-    (&["z", "elevation", "height"], ColumnValues::Position(2)),
-    (&["nx", "normalx"], ColumnValues::Normal(0)),
-    (&["ny", "normaly"], ColumnValues::Normal(1)),
-    (&["nz", "normalz"], ColumnValues::Normal(2)),
-    (&["red", "r"], ColumnValues::Color(0)),
-    (&["green", "g"], ColumnValues::Color(1)),
-    (&["blue", "b"], ColumnValues::Color(2)),
-    (&["radius"], ColumnValues::Radius),
-    (&["intensity", "i", "reflectance"], ColumnValues::Intensity),
-    (&["classification", "class", "label"], ColumnValues::Classification),
-];
 
 impl<'a> Evaluation<'a> {
     /// Finds the columns of a condition; fails if the cloud lacks one.
@@ -138,10 +117,7 @@ fn has_16_bits(other: &Operand) -> bool {
 /// Returns the greatest channel of a colour that is compared with a number; `None` for all other operands.
 pub(super) fn color_range(operand: &Operand, other: &Operand) -> Option<u16> {
     let Operand::Column(name) = operand else { return None };
-    let wanted = plain(name);
-    let is_color = NAMES.iter().any(|(names, column)| {
-        matches!(column, ColumnValues::Color(_)) && names.contains(&wanted.as_str())
-    });
+    let is_color = matches!(KnownColumn::from_name(name), Some(KnownColumn::Color(_)));
     let is_number = matches!(other, Operand::Number(_));
     let max = if has_16_bits(other) { u16::MAX } else { MAX_8_BITS as u16 };
     (is_color && is_number).then_some(max)
@@ -151,26 +127,8 @@ impl ColumnValues<'_> {
     /// Returns the values of a range of points of the cloud that has the column, channels of colours in multiples of
     /// `color_unit`.
     fn values(self, cloud: &PointCloud, color_unit: u16, range: Range<usize>) -> Vec<f64> {
-        let absent = "a column is there if it was found";
         match self {
-            ColumnValues::Position(axis) => {
-                let zero = cloud.origin[axis];
-                cloud.positions[range].iter().map(|p| zero + f64::from(p[axis])).collect()
-            }
-            ColumnValues::Normal(axis) => {
-                let normals = &cloud.normals.as_ref().expect(absent)[range];
-                normals.iter().map(|normal| normal[axis].into()).collect()
-            }
-            ColumnValues::Color(channel) => {
-                let colors = &cloud.colors.as_ref().expect(absent)[range];
-                let unit = f64::from(color_unit);
-                colors.iter().map(|color| f64::from(color[channel]) / unit).collect()
-            }
-            ColumnValues::Radius => widen(&cloud.radii.as_ref().expect(absent)[range]),
-            ColumnValues::Intensity => widen(&cloud.intensity.as_ref().expect(absent)[range]),
-            ColumnValues::Classification => {
-                widen(&cloud.classification.as_ref().expect(absent)[range])
-            }
+            ColumnValues::Known(column) => known_values(column, cloud, color_unit, range),
             ColumnValues::Scalar(values) => match values {
                 Values::U8(values) => widen(&values[range]),
                 Values::U16(values) => widen(&values[range]),
@@ -179,6 +137,33 @@ impl ColumnValues<'_> {
                 Values::F64(values) => values[range].to_vec(),
             },
         }
+    }
+}
+
+fn known_values(
+    column: KnownColumn,
+    cloud: &PointCloud,
+    color_unit: u16,
+    range: Range<usize>,
+) -> Vec<f64> {
+    let absent = "a column is there if it was found";
+    match column {
+        KnownColumn::Position(axis) => {
+            let zero = cloud.origin[axis];
+            cloud.positions[range].iter().map(|p| zero + f64::from(p[axis])).collect()
+        }
+        KnownColumn::Normal(axis) => {
+            let normals = &cloud.normals.as_ref().expect(absent)[range];
+            normals.iter().map(|normal| normal[axis].into()).collect()
+        }
+        KnownColumn::Color(channel) => {
+            let colors = &cloud.colors.as_ref().expect(absent)[range];
+            let unit = f64::from(color_unit);
+            colors.iter().map(|color| f64::from(color[channel]) / unit).collect()
+        }
+        KnownColumn::Radius => widen(&cloud.radii.as_ref().expect(absent)[range]),
+        KnownColumn::Intensity => widen(&cloud.intensity.as_ref().expect(absent)[range]),
+        KnownColumn::Classification => widen(&cloud.classification.as_ref().expect(absent)[range]),
     }
 }
 
@@ -210,24 +195,24 @@ fn find_column<'a>(name: &str, cloud: &'a PointCloud) -> Result<ColumnValues<'a>
     if let Some(scalar) = scalars.clone().find(|scalar| plain(&scalar.name) == wanted) {
         return Ok(ColumnValues::Scalar(&scalar.values));
     }
-    let mut present = NAMES.iter().filter(|(_, column)| is_present(*column, cloud));
-    let found = present.clone().find(|(names, _)| names.contains(&wanted.as_str()));
-    found.map(|(_, column)| *column).ok_or_else(|| {
-        let known = present.by_ref().map(|(names, _)| names[0]);
-        let known: Vec<&str> = known.chain(scalars.map(|scalar| scalar.name.as_str())).collect();
+    let known = KnownColumn::from_name(name).filter(|column| is_present(*column, cloud));
+    known.map(ColumnValues::Known).ok_or_else(|| {
+        let present = KnownColumn::ALL.into_iter().filter(|column| is_present(*column, cloud));
+        let mut known: Vec<&str> = present.map(KnownColumn::name).collect();
+        known.extend(scalars.map(|scalar| scalar.name.as_str()));
         let found = name.to_owned();
         Error::UnknownName { kind: "column of the filter", found, known: known.join(", ") }
     })
 }
 
-fn is_present(column: ColumnValues, cloud: &PointCloud) -> bool {
+fn is_present(column: KnownColumn, cloud: &PointCloud) -> bool {
     match column {
-        ColumnValues::Position(_) | ColumnValues::Scalar(_) => true,
-        ColumnValues::Normal(_) => cloud.normals.is_some(),
-        ColumnValues::Color(_) => cloud.colors.is_some(),
-        ColumnValues::Radius => cloud.radii.is_some(),
-        ColumnValues::Intensity => cloud.intensity.is_some(),
-        ColumnValues::Classification => cloud.classification.is_some(),
+        KnownColumn::Position(_) => true,
+        KnownColumn::Normal(_) => cloud.normals.is_some(),
+        KnownColumn::Color(_) => cloud.colors.is_some(),
+        KnownColumn::Radius => cloud.radii.is_some(),
+        KnownColumn::Intensity => cloud.intensity.is_some(),
+        KnownColumn::Classification => cloud.classification.is_some(),
     }
 }
 

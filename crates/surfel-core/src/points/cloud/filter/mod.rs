@@ -165,6 +165,7 @@ mod tests {
         assert_eq!(kept("return_number == number_of_returns"), [0, 1, 3]);
         assert_eq!(kept("ReturnNumber < NumberOfReturns"), [2]);
         assert_eq!(kept("z > 1001"), [2, 3]);
+        assert_eq!(kept("altitude > 1001 && East < 3"), [2]);
         assert_eq!(kept("1001 <= z && !(x >= 3)"), [1, 2]);
         assert_eq!(kept("blue == 65535 && red != 65535"), [0, 1, 2, 3]);
         assert_eq!(kept("blue == 255 && red < 1"), [0, 1, 2, 3]);
