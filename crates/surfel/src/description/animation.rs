@@ -88,7 +88,7 @@ settings! {
         seconds: f64, SECONDS, "SECONDS";
         /// Turns of an orbit; negative ones go clockwise as the axis points to the viewer.
         turns: f64 = 1.0, TURNS, "N";
-        /// Axis of an orbit [default: up].
+        /// Axis of an orbit [default: up for the camera, z for objects].
         axis: DVec3, Vector, "X,Y,Z";
         /// Center of an orbit, in the coordinates of the parent [default: the object's own origin].
         center: DVec3, Vector, "X,Y,Z";

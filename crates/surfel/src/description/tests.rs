@@ -5,7 +5,7 @@ use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Camera, Projection, Track};
-use surfel_core::surface::SurfaceKind;
+use surfel_core::surface::{Align, GatherLimit, SurfaceKind, SurfaceOptions};
 
 fn parse(text: &str) -> Result<SceneDescription, Invalid> {
     SceneDescription::parse(text, false, Path::new("/data"))
@@ -221,6 +221,30 @@ fn settings_of_an_object_override_those_of_the_scene() {
     let own = scene.objects[0].settings.over(&scene.objects_default);
     assert_eq!(own.surface.surface(), SurfaceKind::Disc);
     assert_eq!((own.preparation.normals_k, own.preparation.normals_radius), (None, Some(1.0)));
+}
+
+#[test]
+fn keys_of_the_surface_are_its_options() {
+    let options = |text: &str| parse(text).unwrap().objects_default.surface.options();
+    assert_eq!(options(""), SurfaceOptions::default());
+    let text = "align = \"nearest\"\ngather-limit = \"nearest\"\nmin-distance = 3\nreach = 1.5\n\
+        density = 7\ndegree = 3";
+    let expected = SurfaceOptions {
+        align: Align::Nearest,
+        gather_limit: GatherLimit::Nearest,
+        min_distance: Some(3.0),
+        reach: Some(1.5),
+        density: 7,
+        degree: 3,
+    };
+    assert_eq!(options(text), expected);
+    let (of_scene, default) = (parse(text).unwrap(), SurfaceOptions::default());
+    let own = parse("[[object]]\nfile = \"a.ply\"\nalign = \"each\"\nreach = 2").unwrap();
+    let own = own.objects[0].settings.over(&of_scene.objects_default).surface.options();
+    assert_eq!(own, SurfaceOptions { align: Align::Each, reach: Some(2.0), ..expected });
+    // No value above is the default, which would hide that a key is not read.
+    assert!(expected.align != default.align && expected.gather_limit != default.gather_limit);
+    assert!(expected.density != default.density && expected.degree != default.degree);
 }
 
 #[test]
