@@ -26,6 +26,8 @@ mod materials;
 mod pictures;
 #[path = "cli/plans.rs"]
 mod plans;
+#[path = "cli/prepare.rs"]
+mod prepare;
 #[path = "cli/scenes.rs"]
 mod scenes;
 #[path = "cli/deformation.rs"]
