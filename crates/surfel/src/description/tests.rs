@@ -3,6 +3,11 @@
 use super::*;
 use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
+use surfel_core::points::{
+    Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, Preparation, Radius,
+    StructureChoice, Subsample,
+};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Camera, Projection, Track};
 use surfel_core::surface::{Align, GatherLimit, SurfaceKind, SurfaceOptions};
@@ -245,6 +250,38 @@ fn keys_of_the_surface_are_its_options() {
     // No value above is the default, which would hide that a key is not read.
     assert!(expected.align != default.align && expected.gather_limit != default.gather_limit);
     assert!(expected.density != default.density && expected.degree != default.degree);
+}
+
+#[test]
+fn keys_of_the_preparation_are_its_settings() {
+    let text = "duplicates = \"keep\"\nclass = [7]\nmixed-pixels = \"keep\"\nsubsample = \"first:9\"\n\
+        remove-outliers = \"radius:2,5\"\ndenoise = \"off\"\nneighbors = \"grid\"\nnormals-k = 12\n\
+        orient = \"up\"\nradius = 0.25\nstructure = \"scatter\"\nfree-space = false\n\
+        color = \"surface_variation\"";
+    let expected = Preparation {
+        duplicates: Duplicates::Keep,
+        kept_noise: vec![7],
+        mixed_pixels: MixedPixels::Keep,
+        subsample: Some(Subsample::First(9)),
+        remove_outliers: Some(OutlierRemoval::Radius { radius: 2.0, count: 5 }),
+        denoise: Denoise::Off,
+        neighbors: NeighborMethod::Grid,
+        normals: Neighborhood::Nearest(12),
+        estimates_normals: true,
+        orientation: Orientation::Up,
+        radii_from_normals: false,
+        radius: Radius::Fixed(0.25),
+        structure: StructureChoice::Scatter,
+        free_space: false,
+        keep_variation: true,
+        seed: 3,
+    };
+    let preparation = |text: &str| parse(text).unwrap().objects_default.preparation(3);
+    assert_eq!(preparation(text), expected);
+    let within = preparation(&text.replace("normals-k = 12", "normals-radius = 1.5"));
+    assert_eq!(within, Preparation { normals: Neighborhood::Within(1.5), ..expected });
+    let plain = Preparation { orientation: Orientation::Station, seed: 3, ..Default::default() };
+    assert_eq!(preparation(""), plain);
 }
 
 #[test]
