@@ -73,6 +73,12 @@ prepare_gdal() {
     apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends gdal-bin >"$log" 2>&1
 }
 
+# Installs ffmpeg, which writes videos; without it their tests are skipped.
+prepare_ffmpeg() {
+    command -v ffmpeg >/dev/null || [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null && return
+    apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends ffmpeg >"$log" 2>&1
+}
+
 # Installs a Vulkan driver that runs on the processor, on which the tests of the GPU run; without any they are skipped.
 prepare_vulkan() {
     # wgpu warns about a missing folder for sockets, which no test uses.
@@ -120,7 +126,8 @@ python_tests() {
     else
         wheel=$(echo "$environment"/*.whl)
         # What surfel works with but does not need; tests that need one that is missing are skipped. Notebooks run once.
-        local others=(laspy pandas trimesh "dask distributed")
+        # Open3D takes a gigabyte and needs system libraries, so its tests are run by hand.
+        local others=(laspy pandas trimesh pyproj xarray pyvista "dask distributed")
         pytest_in "$environment/newest" "${found[0]}" "$wheel" "${others[@]}" "jupyterlab ipykernel nbclient nbformat anywidget"
         [ "${found[0]}" = "${found[-1]}" ] || pytest_in "$environment/oldest" "${found[-1]}" "$wheel" "${others[@]}"
     fi
@@ -165,6 +172,7 @@ done
 check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 prepare_gdal
+prepare_ffmpeg
 prepare_vulkan
 tests "tests" cargo test --workspace --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast

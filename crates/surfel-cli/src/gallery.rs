@@ -145,11 +145,14 @@ seconds = 6
 
 #[cfg(test)]
 mod tests {
-    //! Old files are replaced as a whole.
+    //! Old files are replaced as a whole, and the scene is one that can be rendered.
 
     use super::*;
     use std::fs;
+    use surfel::SceneDescription;
     use surfel_core::progress::NoProgress;
+    use surfel_core::scanner::ruin;
+    use surfel_core::scene::Material;
 
     #[test]
     fn files_are_replaced_not_overwritten() {
@@ -167,5 +170,35 @@ mod tests {
             assert!(3 < fs::metadata(folder.join(name)).unwrap().len(), "{name}");
         }
         fs::remove_dir_all(&folder).unwrap();
+    }
+    #[test]
+    fn the_scene_has_the_ruin_glass_a_mirror_and_gold_before_a_camera_that_turns() {
+        let folder = std::env::temp_dir().join(format!("surfel-scene-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        write(&folder, &NoProgress).unwrap();
+        let ruin = ruin::scan(2000, &NoProgress).unwrap();
+        let file = folder.join("demo.laz");
+        surfel_formats::save(&file, &ruin, &SaveOptions::default(), &NoProgress).unwrap();
+        let mut description = SceneDescription::read(&folder.join("gallery.toml")).unwrap();
+        description.picture.resolution = Some((64, 36));
+        let resolved = surfel::resolve(&description, &NoProgress).unwrap();
+        let mut scene = resolved.build(&NoProgress).unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+
+        assert_eq!(scene.flat().instances.len(), 4);
+        let materials = &scene.flat().materials;
+        let count = |has: fn(&Material) -> bool| materials.iter().filter(|one| has(one)).count();
+        let is_mirror = |one: &Material| one.metallic == 1.0 && one.roughness == 0.0;
+        let is_gold = |one: &Material| one.metallic == 1.0 && one.ignores_vertex_colors;
+        assert_eq!((count(|one| one.transmission == 1.0), count(is_mirror)), (1, 1));
+        assert_eq!(count(is_gold), 2, "the mirror and the knot");
+        // After half of six seconds the camera is on the other side of what it looks at.
+        let mut position_at = |time_secs: f64| {
+            scene.seek(time_secs, &NoProgress).unwrap();
+            scene.flat().camera.position - UTM_ORIGIN
+        };
+        assert!(position_at(0.0).distance(EYE) < 0.01);
+        let opposite = DVec3 { z: EYE.z, ..2.0 * TARGET - EYE };
+        assert!(position_at(3.0).distance(opposite) < 0.01);
     }
 }

@@ -1,5 +1,7 @@
 //! The program from the outside: what it writes, what it says, how it ends.
 
+#[path = "../../surfel-tests/src/skipped.rs"]
+mod skipped;
 #[path = "cli/common.rs"]
 mod common;
 #[path = "cli/animate.rs"]
@@ -24,6 +26,8 @@ mod materials;
 mod pictures;
 #[path = "cli/plans.rs"]
 mod plans;
+#[path = "cli/prepare.rs"]
+mod prepare;
 #[path = "cli/scenes.rs"]
 mod scenes;
 #[path = "cli/deformation.rs"]

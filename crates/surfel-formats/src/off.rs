@@ -47,6 +47,7 @@ pub(crate) fn read(
     let mut body = Body::open(input)?;
     let mut cloud = body.read_vertices(options, progress)?;
     keep_matching(&mut cloud, 0, options.filter.as_ref())?;
+    options.columns.drop_others(&mut cloud);
     Ok(Loaded { cloud, info: file_info(&body.header) })
 }
 

@@ -1,5 +1,9 @@
 //! Readers and writers: real scans, files made by the tests, and malformed files.
 
+#[path = "../../surfel-tests/src/skipped.rs"]
+mod skipped;
+#[path = "../../surfel-tests/src/shared_data.rs"]
+mod shared_data;
 #[path = "formats/common.rs"]
 mod common;
 #[path = "formats/bin.rs"]

@@ -132,7 +132,7 @@ def test_pyvista_colours_and_normals_of_vertices_are_kept():
 
 
 def test_open3d_tensors_are_read():
-    core = pytest.importorskip("open3d").core
+    core = pytest.importorskip("open3d", exc_type=ImportError).core
     import open3d
 
     box = open3d.t.geometry.TriangleMesh.create_box(2, 2, 2)
@@ -167,7 +167,7 @@ def test_pyvista_meshes_and_clouds_are_added():
 
 
 def test_open3d_meshes_and_clouds_are_added():
-    open3d = pytest.importorskip("open3d")
+    open3d = pytest.importorskip("open3d", exc_type=ImportError)
     scene = surfel.Scene()
     scene.add(open3d.geometry.TriangleMesh.create_box(2, 2, 2))
     assert scene.cast_rays([0.5, 0.5, 5, 0, 0, -1])["t_hit"] == 3

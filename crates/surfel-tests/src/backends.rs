@@ -1,8 +1,7 @@
 //! The renderers that draw the same pictures, and how far they may differ.
 
-use std::collections::BTreeSet;
-use std::sync::{Mutex, OnceLock};
-use std::thread;
+use crate::skipped::report_skipped;
+use std::sync::OnceLock;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::{Aovs, Image};
 use surfel_core::math::Vec3;
@@ -124,25 +123,20 @@ pub fn cpu() -> CpuRenderer {
 
 /// Returns the renderer of this machine's first GPU, or of the one that the variable `SURFEL_DEVICE` names. Without
 /// any, says so in a line that is counted.
+///
+/// # Panics
+///
+/// Panics if there are devices and none can be opened.
 pub fn gpu() -> Option<&'static GpuRenderer> {
     static GPU: OnceLock<Result<GpuRenderer, surfel_gpu::Error>> = OnceLock::new();
     let open = || GpuRenderer::open(std::env::var("SURFEL_DEVICE").ok().as_deref());
     match GPU.get_or_init(open) {
         Ok(gpu) => Some(gpu),
-        Err(error) => {
+        Err(error @ surfel_gpu::Error::NoDevice) => {
             report_skipped(&error.to_string());
             None
         }
-    }
-}
-
-/// Prints the line by which `test.sh` counts a skipped test, once for each test: each runs on a thread of its name.
-#[expect(clippy::print_stdout, reason = "the line of a test that cannot run")]
-fn report_skipped(reason: &str) {
-    static REPORTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    let test = thread::current().name().unwrap_or_default().to_owned();
-    if REPORTED.lock().is_ok_and(|mut reported| reported.insert(test)) {
-        println!("skipped: {reason}");
+        Err(error) => panic!("{error}"),
     }
 }
 

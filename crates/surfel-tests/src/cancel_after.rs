@@ -13,6 +13,11 @@ impl CancelAfter {
     pub fn new(n_checks: u64) -> Self {
         Self { n_left: AtomicU64::new(n_checks) }
     }
+
+    /// Returns the number of checks that may still pass.
+    pub fn n_left(&self) -> u64 {
+        self.n_left.load(Ordering::Relaxed)
+    }
 }
 
 impl Progress for CancelAfter {

@@ -1,6 +1,6 @@
 //! Triangle meshes as ground truth for point clouds of the same shape.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use surfel_core::bvh::{self, Bvh, BvhPrimitive, Child, NO_PRIMITIVE};
 use surfel_core::math::{Aabb, LANES, Ray, Vec3};
 use surfel_core::progress::NoProgress;
@@ -24,18 +24,6 @@ pub struct GroundTruthHit {
     pub distance: f32,
     /// The unit normal of the surface, turned toward the ray's origin.
     pub normal: Vec3,
-}
-
-/// Returns the folder of test data beside the checkout or above it, or prints that it is absent and returns `None`.
-pub fn shared_data() -> Option<PathBuf> {
-    let ancestors = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
-    let mut folders = ancestors.map(|ancestor| ancestor.join("shared/data"));
-    let found = folders.find(|folder| folder.is_dir());
-    #[expect(clippy::print_stdout, reason = "a skipped test reports itself")]
-    if found.is_none() {
-        println!("skipped: ../shared/data is absent");
-    }
-    found
 }
 
 impl GroundTruth {

@@ -1,5 +1,7 @@
 //! Scenes, clouds and ground truth that the tests and benchmarks of all crates share.
 
+pub mod skipped;
+pub mod shared_data;
 pub mod cancel_after;
 pub mod clouds;
 pub mod scenes;

@@ -225,13 +225,14 @@ mod tests {
             ..RunSettings::default()
         };
         let renderer = SceneRenderer::new(&run).unwrap();
-        if renderer.automatic_gpu().is_none() {
+        if surfel_gpu::devices().is_empty() {
             #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
             {
                 println!("skipped: there is no GPU");
             }
             return;
         }
+        assert!(renderer.automatic_gpu().is_some(), "{:?}", renderer.open_gpu().err());
         let settings =
             Settings { width: 64, height: 64, light_samples: 1 << 13, ..Settings::default() };
         let notes = Notes::default();

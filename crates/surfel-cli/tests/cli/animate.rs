@@ -3,6 +3,7 @@
 use super::common::{
     Folder, SMALL, command, dome, fail, gltf, read_png, square, stderr, succeed, surfel, tile,
 };
+use crate::skipped::report_skipped;
 use std::fs;
 use std::process::Command;
 
@@ -105,10 +106,7 @@ fn video_is_written_if_ffmpeg_is_installed() {
         let bytes = fs::read(&video).unwrap();
         assert_eq!(&bytes[4..8], b"ftyp");
     } else {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: ffmpeg is absent");
-        }
+        report_skipped("ffmpeg is absent");
     }
     // Without ffmpeg the error comes before the work and names other formats.
     let nowhere = folder.path("");
@@ -441,4 +439,53 @@ fn a_cluster_needs_the_python_package() {
         "{text}"
     );
     assert_eq!(folder.names(), ["dome.ply"]);
+}
+
+#[test]
+fn keys_and_orbits_change_the_size_visibility_and_side_of_objects() {
+    let folder = Folder::new();
+    folder.write("tile.ply", tile(1.0, 0.0, [250, 10, 10]));
+    folder.write("ground.ply", tile(9.0, -9.0, [10, 10, 250]));
+    let ground = "[[object]]\nfile = \"ground.ply\"\n";
+    let at = |text: &str, times: &[&str]| {
+        at_times(&folder, &(tile_at([3.0, 2.0], text) + ground), times)
+    };
+    let still = |keys: &str| at(keys, &["0"]).remove(0);
+    let moved =
+        |[x, y]: [f64; 2]| at_times(&folder, &(tile_at([x, y], "") + ground), &["0"]).remove(0);
+    for (movement, time, expected) in [
+        ("times = [0, 2]\nscale = [1, [2, 0.5, 1]]", "2", still("scale = [2, 0.5, 1]")),
+        ("times = [0, 2]\nscale = [1, 2]", "1", still("scale = 1.5")),
+        ("times = [0, 2]\nvisible = [true, false]", "1.9", still("")),
+        ("times = [0, 2]\nvisible = [true, false]", "2", still("visible = false")),
+        ("times = [0, 2]\nvisible = [false, true]", "1", still("visible = false")),
+        ("kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 2", "1", moved([-3.0, -2.0])),
+        // A quarter of a turn clockwise, half a turn in the time of a whole one, and half a turn about x and y.
+        (
+            "kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 2\nturns = -0.5",
+            "1",
+            moved([2.0, -3.0]),
+        ),
+        (
+            "kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 2\nturns = 1.5",
+            "2",
+            moved([-3.0, -2.0]),
+        ),
+        (
+            "kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 2\naxis = [1, 0, 0]",
+            "1",
+            moved([3.0, -2.0]),
+        ),
+        (
+            "kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 2\naxis = [0, 2, 0]",
+            "1",
+            moved([-3.0, 2.0]),
+        ),
+    ] {
+        let shown = at(&format!("[[animation]]\nobject = \"t\"\n{movement}\n"), &["0", time]);
+        let found = difference(&shown[1], &expected);
+        assert!(found < 1.0, "{movement} at {time}: {found}");
+        let is_changed = 2.0 < difference(&shown[1], &still("")) || time == "1.9";
+        assert!(is_changed, "{movement} at {time} changes nothing");
+    }
 }

@@ -1,6 +1,7 @@
 //! Cameras of glTF files: which one is used, its focal point, and its keys in a dry run; and views from within.
 
-use super::common::{Folder, SMALL, fail, gltf_with_cameras, read_png, shot, succeed};
+use super::common::{Folder, SMALL, dome, fail, gltf_with_cameras, read_png, shot, stderr};
+use super::common::{succeed, surfel};
 use serde_json::{Value, json};
 
 fn site() -> (Folder, String) {
@@ -67,8 +68,8 @@ fn a_picture_of_a_turntable_is_the_frame_of_its_time() {
     assert_eq!(shot(&folder, &[&scene]), shot(&folder, &[&file]));
 }
 
-/// Returns the points of a room of 6 x 4 x 2.5 m with red walls and a red ceiling, a green floor and a green table.
-fn room() -> String {
+/// Returns the points of a room of 6 x 4 x 2.5 m with red walls and a red ceiling, a green floor and a green table or none.
+fn room(has_table: bool) -> String {
     let (red, green) = ("200 0 0", "0 200 0");
     let side = |n: i32| (0..=n).map(|i| f64::from(i) / 10.0);
     let grid = |a: i32, b: i32| side(a).flat_map(move |x| side(b).map(move |y| (x, y)));
@@ -80,7 +81,7 @@ fn room() -> String {
         add(x, y, 0.0, green);
         add(x, y, 2.5, red);
     }
-    for (x, y) in grid(20, 10) {
+    for (x, y) in grid(20, 10).filter(|_| has_table) {
         add(2.0 + x, 1.5 + y, 0.8, green);
     }
     for y in [0.0, 4.0] {
@@ -95,21 +96,53 @@ fn room() -> String {
 #[test]
 fn a_turntable_opens_a_room_toward_the_camera_of_each_frame() {
     let folder = Folder::new();
-    let file = folder.write("room.xyz", room());
+    let file = folder.write("room.xyz", room(true));
     let turn = folder.path("f#.png");
     let options = ["--turntable", "4", "--fps", "1", "--light", "none", "--background", "#000"];
     succeed(&[&["animate", &file, "-o", &turn], &options[..], &SMALL].concat());
     for frame in 1..=4 {
-        let (width, height, _, samples) = read_png(folder.path(&format!("f{frame}.png")));
         // The floor fills the middle fifth of each frame.
-        let middle = (2 * height / 5..3 * height / 5)
-            .flat_map(|y| (2 * width / 5..3 * width / 5).map(move |x| (y * width + x) as usize));
-        let (n_green, n_red) = middle.fold((0, 0), |(n_green, n_red), pixel| {
-            let [red, green] = [0, 1].map(|channel| samples[3 * pixel + channel]);
-            (n_green + u32::from(red < green), n_red + u32::from(green < red))
-        });
+        let (n_green, n_red) = n_green_and_red(&folder.path(&format!("f{frame}.png")));
         assert!(10 * n_red < n_green, "{frame}: {n_green} green pixels, {n_red} red ones");
     }
+}
+
+/// Returns the number of green and of red pixels in the middle fifth of a picture.
+fn n_green_and_red(picture: &str) -> (u32, u32) {
+    let (width, height, channels, samples) = read_png(picture);
+    let middle = (2 * height / 5..3 * height / 5)
+        .flat_map(|y| (2 * width / 5..3 * width / 5).map(move |x| (y * width + x) as usize));
+    middle.fold((0, 0), |(n_green, n_red), pixel| {
+        let [red, green] = [0, 1].map(|channel| samples[channels * pixel + channel]);
+        (n_green + u32::from(red < green), n_red + u32::from(green < red))
+    })
+}
+
+#[test]
+fn an_empty_room_is_opened_only_if_asked_for_and_a_furnished_one_unless_forbidden() {
+    let folder = Folder::new();
+    let picture = folder.path("room.png");
+    let empty = folder.write("empty.xyz", room(false));
+    let furnished = folder.write("furnished.xyz", room(true));
+    let plain = ["--light", "none", "--background", "#000", "--camera-elevation-angle", "60"];
+    let shows_floor = |room: &str, options: &[&str]| {
+        let arguments = [&["render", room, "-o", &picture][..], &plain, &SMALL, options];
+        let output = surfel(&arguments.concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let (n_green, n_red) = n_green_and_red(&picture);
+        assert!(0 < n_green + n_red && n_green.min(n_red) * 5 < n_green.max(n_red));
+        assert_eq!(stderr(&output).contains("hidden [--camera-interior]"), n_red < n_green);
+        n_red < n_green
+    };
+    let interior = |when| ["--camera-interior", when];
+    assert!(!shows_floor(&empty, &[]) && !shows_floor(&empty, &interior("auto")));
+    assert!(shows_floor(&empty, &interior("on")) && !shows_floor(&empty, &interior("off")));
+    assert!(shows_floor(&furnished, &[]) && !shows_floor(&furnished, &interior("off")));
+    // Where there is no room, it is said that nothing is hidden.
+    let open = folder.write("dome.ply", dome(30));
+    let render = ["render", &open, "-o", &picture, "--camera-interior", "on"];
+    let message = stderr(&surfel(&[&render[..], &SMALL].concat()));
+    assert!(message.contains("no room was found: nothing is hidden"), "{message}");
 }
 
 #[test]

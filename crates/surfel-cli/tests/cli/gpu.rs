@@ -1,13 +1,13 @@
 //! GPUs: the list of devices, and what is said where a GPU cannot do what it is told.
 
 use super::common::{Folder, command, dome, fail, succeed};
+use crate::skipped::report_skipped;
 
 /// Returns true if a run found no GPU, of which it wrote these lines; the test then says that it is skipped.
-#[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
 fn lacks_gpu(stderr: &str) -> bool {
     let error = stderr.lines().find(|line| line.contains("no GPU was found"));
     if let Some(error) = error {
-        println!("skipped: {error}");
+        report_skipped(error);
     }
     error.is_some()
 }

@@ -135,6 +135,46 @@ fn point_size_is_a_key_of_scene_files_and_of_the_dry_run() {
 }
 
 #[test]
+fn another_seed_gives_other_noise() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
+    let first = picture(&["--seed", "1"]);
+    assert!(picture(&["--seed", "1"]) == first);
+    assert!(picture(&["--seed", "2"]) != first);
+    // Without samples that random numbers place there is no noise.
+    let plain = ["--light", "none", "--surface", "points"];
+    let without = |seed| picture(&[&plain[..], &["--seed", seed]].concat());
+    assert!(without("1") == without("2"));
+    let kept = |seed: &str| {
+        let kept = folder.path("kept.xyz");
+        succeed(&["prepare", &cloud, "-o", &kept, "--subsample", "random:50", "--seed", seed]);
+        fs::read_to_string(kept).unwrap()
+    };
+    assert!(kept("1") == kept("1") && kept("1") != kept("2"));
+}
+
+#[test]
+fn a_noise_threshold_saves_the_camera_rays_of_even_pixels() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let picture = folder.path("dome.png");
+    let primary = |options: &[&str]| {
+        let render = ["render", &cloud, "-o", &picture, "--resolution", "32x24", "--spp", "64"];
+        let run = ["--light-samples", "1", "--backend", "cpu", "--stats", "-"];
+        let stats = succeed(&[&render[..], &run, options].concat());
+        let stats: serde_json::Value = serde_json::from_str(&stats).unwrap();
+        stats["rays"]["primary"].as_u64().unwrap()
+    };
+    let all = 32 * 24 * 64;
+    assert_eq!(primary(&[]), all);
+    assert_eq!(primary(&["--noise-threshold", "0"]), all);
+    let (fine, coarse) =
+        (primary(&["--noise-threshold", "0.01"]), primary(&["--noise-threshold", "0.5"]));
+    assert!(coarse < fine && fine < all, "{coarse} {fine} {all}");
+}
+
+#[test]
 fn an_exr_has_all_layers() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
@@ -170,7 +210,10 @@ fn support_is_a_colour_source_with_a_map_and_a_range() {
     assert!(support != picture(&["--color", "support", "--cmap", "coolwarm"]));
     assert!(support != picture(&["--color", "support", "--range", "0,0.5"]));
     for surface in ["disc", "splat", "sphere", "points"] {
-        assert!(picture(&["--color", "support", "--surface", surface]) != support, "{surface}");
+        let by_support = picture(&["--color", "support", "--surface", surface]);
+        assert!(by_support != picture(&["--surface", surface]), "{surface}");
+        let other_map = ["--color", "support", "--cmap", "coolwarm", "--surface", surface];
+        assert!(by_support != picture(&other_map), "{surface}");
     }
     let file = folder.path("told.png");
     let render = ["render", &cloud, "-o", &file, "--color", "support"];

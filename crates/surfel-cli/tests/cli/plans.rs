@@ -1,6 +1,7 @@
 //! Plans to scale: where a known point lands, and what other programs read of them.
 
 use super::common::{Folder, fail, read_png, stderr, succeed, surfel};
+use crate::skipped::report_skipped;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -52,10 +53,7 @@ fn gdal(program: &str, arguments: &[&str]) -> Option<String> {
             Some(String::from_utf8(output.stdout).unwrap())
         }
         Err(_) => {
-            #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-            {
-                println!("skipped: {program} is absent");
-            }
+            report_skipped(&format!("{program} is absent"));
             None
         }
     }

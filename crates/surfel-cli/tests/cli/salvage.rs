@@ -1,6 +1,7 @@
 //! Damaged files: errors name the option that reads what is whole, and each command has it.
 
 use crate::common::{Folder, fail, stderr, succeed, surfel};
+use crate::viewer::Server;
 use serde_json::Value;
 
 /// Writes a LAS file of 400 points that is cut within the 301st, and returns its name.
@@ -39,7 +40,9 @@ fn every_command_salvages_what_is_whole() {
         let text = stderr(&output);
         assert!(output.status.success() && text.contains(note), "{arguments:?}: {text}");
     }
-    assert!(succeed(&["view", "--help"]).contains("--salvage"));
+    let server = Server::start(&["--salvage", &cut, "--spp", "1"]);
+    let served = server.get("/render?resolution=16x12");
+    assert!(served == (200, std::fs::read(&picture).unwrap()));
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Helpers for all tests: shared scans, temporary folders, recorded notes and small clouds.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::shared_data::shared_data;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Scalar, Values};
 use surfel_core::progress::{NoProgress, Progress};
@@ -12,17 +13,9 @@ use surfel_formats::{
     Error, FileInfo, LoadOptions, Loaded, SaveOptions, load, load_bytes, load_graph_bytes, save,
 };
 
-/// Returns the path of a shared test file, or prints a note and returns `None` if the shared data is absent.
+/// Returns the path of a shared test file, or reports that the shared data is absent and returns `None`.
 pub fn shared(name: &str) -> Option<PathBuf> {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if !data.is_dir() {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: ../shared/data is absent");
-        }
-        return None;
-    }
-    Some(data.join(name))
+    Some(shared_data()?.join(name))
 }
 
 /// A temporary folder that is removed when dropped.

@@ -4,7 +4,7 @@ use crate::common::{Listener, read};
 use surfel_core::math::DVec3;
 use surfel_formats::{LoadOptions, load_bytes};
 
-const HEADER: &str = "ncols 3\nnrows 2\nxllcorner 1000\nyllcorner 2000\ncellsize 10\n";
+pub const HEADER: &str = "ncols 3\nnrows 2\nxllcorner 1000\nyllcorner 2000\ncellsize 10\n";
 
 #[test]
 fn cells_become_points_at_their_middles_from_north_to_south() {

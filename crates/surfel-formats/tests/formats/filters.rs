@@ -9,7 +9,7 @@ use surfel_formats::{Column, ColumnChoice, LoadOptions, load, load_bytes, load_g
 
 use crate::common::{Listener, encode_cloud, full_cloud, read, shared};
 use crate::gltf_asset::{Asset, SQUARE, full_asset};
-use crate::{e57_writer, gltf, pcd, ptx};
+use crate::{e57_writer, esri_grid, gltf, pcd, ptx};
 
 fn filtered(filter: &str) -> LoadOptions {
     let filter: PointFilter = filter.parse().unwrap();
@@ -32,6 +32,18 @@ fn every_format_keeps_the_same_points_as_a_filter_afterwards() {
         ("compressed.pcd", pcd::compressed_file(), "red > 0"),
         ("a.ptx", ptx::two_scans().into(), "intensity >= 0.75"),
         ("a.e57", e57_writer::small_file(), "z < 5 || y > 4900005"),
+        (
+            "a.bin",
+            [1.0f32, 2.0, 3.0].map(|x| [x; 7].map(f32::to_le_bytes).concat()).concat(),
+            "x > 1",
+        ),
+        ("a.off", "COFF\n2 0 0\n1 2 3 255 0 0 255\n4 5 6 0 255 0 255\n".into(), "green > 100"),
+        ("a.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\n".into(), "y == 5"),
+        (
+            "a.asc",
+            (esri_grid::HEADER.to_owned() + "5 6 7\n8 -9999 9\n").into(),
+            "z > 6 && y < 2010",
+        ),
         ("a.glb", two_clouds().glb(), "z > 0.5 && red > 100"),
         ("a.gltf", gltf::embedded(&full_asset()), "z >= 1"),
     ];

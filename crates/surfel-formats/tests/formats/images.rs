@@ -1,14 +1,24 @@
 //! Image files, read back by the crates for their formats.
 
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
 use exr::prelude::{FlatSamples, read_first_flat_layer_from_file};
 use surfel_core::image::{Image, NO_ID, decode_srgb};
 use surfel_core::math::{DVec3, Vec3};
-use surfel_formats::{Alpha, BitDepth, ImageOptions, encode_png, save_image};
+use surfel_formats::{
+    Alpha, BitDepth, EpsgCodes, Georeference, HeightMap, ImageOptions, encode_png, save_height_map,
+    save_image,
+};
+use tiff::decoder::ifd::Value;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::tags::Tag;
 
 use crate::common::Folder;
 
-fn decode_png(path: &std::path::Path) -> (png::ColorType, png::BitDepth, Vec<u8>) {
-    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+fn decode_png(path: &Path) -> (png::ColorType, png::BitDepth, Vec<u8>) {
+    let file = BufReader::new(File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut bytes).unwrap();
@@ -148,4 +158,114 @@ fn pictures_for_display_hold_the_colours_of_the_png() {
     let error = save_image(&folder.path("a.jpeg"), &Image::new(70_000, 1), &sixteen).unwrap_err();
     assert!(error.to_string().contains("a.jpeg"), "{error}");
     assert!(!folder.path("a.jpeg").exists());
+}
+
+/// Opens a TIFF file with the decoder of its crate.
+fn tiff_decoder(path: &Path) -> Decoder<BufReader<File>> {
+    Decoder::new(BufReader::new(File::open(path).unwrap())).unwrap()
+}
+
+#[test]
+fn height_maps_hold_their_elevations_and_their_place() {
+    let folder = Folder::new("heights");
+    let path = folder.path("a.tif");
+    let north_up = Georeference {
+        corner: [691_600.0, 5_334_800.0],
+        right: [0.5, 0.0],
+        down: [0.0, -0.25],
+        epsg: Some(EpsgCodes { horizontal: 25832, vertical: Some(7837) }),
+        is_geographic: false,
+    };
+    let saved = |georeference: Georeference| {
+        let elevations = vec![512.25, -3.5, f32::NAN, 0.0, 1e6, 8848.86];
+        save_height_map(&path, &HeightMap { width: 3, height: 2, elevations, georeference })
+            .unwrap();
+        tiff_decoder(&path)
+    };
+    let mut file = saved(north_up);
+    assert_eq!(file.dimensions().unwrap(), (3, 2));
+    let DecodingResult::F32(elevations) = file.read_image().unwrap() else { panic!("no floats") };
+    assert_eq!(elevations, [512.25, -3.5, -9999.0, 0.0, 1e6, 8848.86]);
+    assert_eq!(file.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "-9999");
+    let scale = file.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
+    assert_eq!(scale, [0.5, 0.25, 0.0]);
+    let tie_point = file.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+    assert_eq!(tie_point, [0.0, 0.0, 0.0, 691_600.0, 5_334_800.0, 0.0]);
+    assert!(file.find_tag(Tag::ModelTransformationTag).unwrap().is_none());
+    // Version 1.1.1 and four keys: a projected system, areas, and the codes of both systems.
+    let keys =
+        [[1, 1, 1, 4], [1024, 0, 1, 1], [1025, 0, 1, 1], [3072, 0, 1, 25832], [4096, 0, 1, 7837]];
+    let found = file.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap();
+    assert_eq!(found, keys.as_flattened());
+
+    // Rows that do not go east need a matrix.
+    let turned = Georeference { right: [0.0, 0.5], down: [0.25, 0.0], epsg: None, ..north_up };
+    let mut file = saved(turned);
+    let matrix =
+        [[0.0, 0.25, 0.0, 691_600.0], [0.5, 0.0, 0.0, 5_334_800.0], [0.0; 4], [0.0, 0.0, 0.0, 1.0]];
+    let found = file.get_tag_f64_vec(Tag::ModelTransformationTag).unwrap();
+    assert_eq!(found, matrix.as_flattened());
+    assert!(file.find_tag(Tag::ModelPixelScaleTag).unwrap().is_none());
+    let keys = file.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap();
+    assert_eq!(keys, [1, 1, 1, 1, 1025, 0, 1, 1]);
+
+    let degrees = EpsgCodes { horizontal: 4326, vertical: None };
+    let degrees = Georeference { epsg: Some(degrees), is_geographic: true, ..north_up };
+    let keys = saved(degrees).get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap();
+    assert_eq!(keys[4..], [1024, 0, 1, 2, 1025, 0, 1, 1, 2048, 0, 1, 4326]);
+}
+
+#[test]
+fn the_place_of_a_plan_does_not_change_its_picture() {
+    let folder = Folder::new("plan");
+    let mut image = Image::new(9, 4);
+    for (i, pixel) in image.color.iter_mut().enumerate() {
+        *pixel = [i as f32 / 40.0, 0.25, 0.5, 1.0];
+    }
+    let georeference = Georeference {
+        corner: [10.0, 20.0],
+        right: [2.0, 0.0],
+        down: [0.0, -2.0],
+        epsg: None,
+        is_geographic: false,
+    };
+    let plan = ImageOptions { georeference: Some(georeference), ..ImageOptions::default() };
+    let (plain, placed) = (folder.path("plain.tif"), folder.path("plan.tif"));
+    save_image(&plain, &image, &ImageOptions::default()).unwrap();
+    save_image(&placed, &image, &plan).unwrap();
+    assert_eq!(image::open(&placed).unwrap(), image::open(&plain).unwrap());
+    let scale = tiff_decoder(&placed).get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
+    assert_eq!(scale, [2.0, 2.0, 0.0]);
+    assert!(tiff_decoder(&plain).find_tag(Tag::GeoKeyDirectoryTag).unwrap().is_none());
+}
+
+#[test]
+fn the_resolution_of_a_print_is_in_files_that_have_one() {
+    let folder = Folder::new("dpi");
+    let options = ImageOptions { dpi: Some(299.5), ..ImageOptions::default() };
+    let image = Image::new(4, 3);
+    let path = |name: &str| {
+        let path = folder.path(name);
+        save_image(&path, &image, &options).unwrap();
+        path
+    };
+    let mut tiff = tiff_decoder(&path("a.tif"));
+    for tag in [Tag::XResolution, Tag::YResolution] {
+        let Value::Rational(n, d) = tiff.get_tag(tag).unwrap() else { panic!("no fraction") };
+        assert_eq!(f64::from(n) / f64::from(d), 299.5, "{tag:?}");
+    }
+    // 2 stands for pixels per inch.
+    assert_eq!(tiff.get_tag_u32(Tag::ResolutionUnit).unwrap(), 2);
+    // The segment JFIF: a name, a version, the unit 1 (pixels per inch), and whole numbers of pixels.
+    let jpeg = std::fs::read(path("a.jpg")).unwrap();
+    assert_eq!((&jpeg[..4], &jpeg[6..11]), (&[0xff, 0xd8, 0xff, 0xe0][..], &b"JFIF\0"[..]));
+    assert_eq!(jpeg[13..18], [1, 1, 44, 1, 44]);
+    let file = BufReader::new(File::open(path("a.png")).unwrap());
+    let png = png::Decoder::new(file).read_info().unwrap();
+    let density = png.info().pixel_dims.unwrap();
+    assert_eq!((density.xppu, density.yppu), (11_791, 11_791));
+    // Without a resolution there is none.
+    save_image(&folder.path("b.tif"), &image, &ImageOptions::default()).unwrap();
+    let unit = tiff_decoder(&folder.path("b.tif")).find_tag(Tag::ResolutionUnit).unwrap();
+    assert!(unit.is_none_or(|unit| unit.into_u32().unwrap() != 2));
 }

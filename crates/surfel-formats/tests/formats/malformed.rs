@@ -5,7 +5,7 @@ use surfel_core::progress::NoProgress;
 use surfel_formats::{ColumnChoice, Error, LoadOptions, check_cloud_output, load, load_bytes};
 
 use crate::common::{Folder, Listener, encode_cloud, full_cloud, read};
-use crate::{e57_writer, pcd, ptx};
+use crate::{e57_writer, esri_grid, pcd, ptx};
 
 fn message(name: &str, bytes: impl AsRef<[u8]>) -> String {
     read(name, bytes).unwrap_err().to_string()
@@ -34,6 +34,8 @@ pub fn small_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.e57", e57_writer::small_file()),
         ("a.obj", "o cube\nv 1 2 3\nv 1 2 3\nf 1 2 1\n".into()),
         ("a.bin", [1.0f32; 7 * 3].map(f32::to_le_bytes).concat()),
+        ("a.off", "CNOFF\n2 0 0\n1 2 3 0 0 1 255 0 0 255\n4 5 6 0 0 1 0 255 0 255\n".into()),
+        ("a.asc", format!("{}NODATA_value -1\n5 6 7\n8 -1 9.5\n", esri_grid::HEADER).into()),
     ]
 }
 

@@ -58,6 +58,8 @@ fn small_files() -> Vec<(&'static str, Vec<u8>)> {
     let strips = ply("ascii", &strips) + "6 0 1 2 -1 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
     let obj = "mtllib a.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\nvt 0 0.5\nvn 0 0 1\n\
         usemtl a\nf 1/1/1 2/1/1 3/1/1\nusemtl b\nf -3//1 -2//-1 \\\n -1\n";
+    let off = "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n1 1 0 0 0 255 255\n\
+        0 1 0 9 9 9 255\n4 0 1 2 3\n3 2 3 0 255 0 0\n";
     let stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
         endloop\nendfacet\nendsolid a\n";
     vec![
@@ -67,6 +69,7 @@ fn small_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.obj", obj.into()),
         ("ascii.stl", stl.into()),
         ("binary.stl", binary_stl()),
+        ("a.off", off.into()),
     ]
 }
 

@@ -12,6 +12,7 @@ use surfel_formats::{
 };
 
 use crate::common::{Folder, Listener};
+use crate::skipped::report_skipped;
 
 /// Returns the 8-bit sRGB colour of a pixel: a smooth gradient of more than 256 colours that changes per frame.
 fn color_at(frame: u32, x: u32, y: u32) -> [u8; 3] {
@@ -60,10 +61,7 @@ fn write_movie(path: &Path, options: &MovieOptions) {
 fn has_ffmpeg() -> bool {
     let found = Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).status().is_ok();
     if !found {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: ffmpeg is absent");
-        }
+        report_skipped("ffmpeg is absent");
     }
     found
 }

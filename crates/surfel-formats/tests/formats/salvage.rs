@@ -62,15 +62,25 @@ fn whole_files_are_read_without_a_note() {
 fn files_cut_anywhere_give_their_first_points() {
     for (name, bytes) in small_files() {
         let whole = read(name, &bytes).unwrap().cloud;
+        let mut is_salvaged = false;
         for length in 0..bytes.len() {
-            let Ok(loaded) = salvage(name, &bytes[..length]) else { continue };
-            // Text without a number of points may end within a number.
-            if ["a.csv", "a.pts", "a.obj"].contains(&name) {
+            let part = &bytes[..length];
+            let Ok(loaded) = salvage(name, part) else {
+                // A longer file is refused only for a number of which there is the sign alone; BIN has no header to tell
+                // a cut record from another format.
+                let may_fail = !is_salvaged || part.ends_with(b"-") || name == "a.bin";
+                assert!(may_fail, "{name}: {length} bytes are refused, and fewer are not");
+                continue;
+            };
+            is_salvaged = true;
+            // Text may end within a number.
+            if ["a.csv", "a.pts", "a.obj", "a.off", "a.asc"].contains(&name) {
                 assert!(loaded.cloud.len() <= whole.len(), "{name} {length}");
             } else {
                 assert_is_prefix(name, &loaded.cloud, &whole);
             }
         }
+        assert!(is_salvaged, "{name}");
     }
 }
 

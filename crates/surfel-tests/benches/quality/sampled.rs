@@ -16,11 +16,12 @@ use surfel_core::scene::{CloudGeometry, Geometry};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::{Deviation, TrueViews};
-use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::ground_truth::GroundTruth;
 use surfel_tests::lit::LitViews;
 use surfel_tests::sampling::{Sampling, mean_spacing};
 use surfel_tests::scenes;
 use surfel_tests::shapes;
+use surfel_tests::shared_data::shared_data;
 
 /// A shape and the number of points that it is sampled with.
 struct Shape {

@@ -7,10 +7,11 @@ use surfel_core::scanner::scenes::ruin;
 use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Projection, fit_camera};
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_tests::clouds;
-use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::ground_truth::GroundTruth;
 use surfel_tests::sampling::Sampling;
 use surfel_tests::scenes;
 use surfel_tests::shapes;
+use surfel_tests::shared_data::shared_data;
 
 /// A prepared cloud and a camera.
 #[derive(Clone)]

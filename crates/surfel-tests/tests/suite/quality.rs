@@ -7,10 +7,11 @@ use surfel_core::progress::NoProgress;
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::{Deviation, TrueViews};
-use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::ground_truth::GroundTruth;
 use surfel_tests::sampling::{Sampling, mean_spacing};
 use surfel_tests::scenes;
 use surfel_tests::shapes;
+use surfel_tests::shared_data::shared_data;
 
 const RESOLUTION: u32 = 128;
 

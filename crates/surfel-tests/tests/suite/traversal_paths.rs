@@ -17,8 +17,9 @@ use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{Hit, Simd};
 use surfel_formats::{LoadOptions, load};
 use surfel_tests::clouds;
-use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::ground_truth::GroundTruth;
 use surfel_tests::scenes;
+use surfel_tests::shared_data::shared_data;
 
 #[test]
 fn all_paths_find_the_same_hits_in_sound_clouds() {

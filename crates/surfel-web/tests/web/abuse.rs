@@ -114,18 +114,23 @@ impl Random {
     }
 }
 
-/// Resident memory of this process, which runs all tests.
-fn resident_mib() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kib = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.strip_suffix("kB"));
-    kib.map_or(0.0, |kib| kib.trim().parse::<f64>().unwrap() / 1024.0)
+/// Resident memory of this process, which runs all tests; only Linux tells it.
+fn resident_mib() -> Option<f64> {
+    let read = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let kib = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.strip_suffix("kB"));
+        kib.unwrap().trim().parse::<f64>().unwrap() / 1024.0
+    };
+    cfg!(target_os = "linux").then(read)
 }
 
-const MAX_MIB: f64 = 1500.0;
+/// More than three times what all tests at once were measured to take: 150 MiB, with 2 threads as with 16.
+const MAX_MIB: f64 = 500.0;
 
 async fn assert_healthy(server: &TestServer) {
     server.assert_serves_pictures().await;
-    assert!(resident_mib() < MAX_MIB, "{}", resident_mib());
+    let mib = resident_mib();
+    assert!(mib.is_none_or(|mib| mib < MAX_MIB), "{mib:?}");
 }
 
 /// Sends messages until the server closes the connection, reading now and then; returns the number of those sent.
@@ -172,7 +177,7 @@ async fn first_messages_of_any_content_are_survived() {
     let mut random = Random(7);
     for _ in 0..200 {
         // Pages that have just disconnected may still hold all permits.
-        let Ok(mut page) = TestPage::connect(&server).await else { continue };
+        let mut page = TestPage::connect_when_possible(&server).await;
         page.send(Message::text(random.message().to_string())).await.unwrap();
     }
     for first in [
@@ -345,7 +350,8 @@ async fn slow_readers_are_closed() {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     server.assert_serves_pictures().await;
-    assert!(resident_mib() - before < MAX_MIB);
+    let grown = resident_mib().zip(before).map(|(after, before)| after - before);
+    assert!(grown.is_none_or(|mib| mib < MAX_MIB), "{grown:?}");
 }
 
 #[tokio::test]

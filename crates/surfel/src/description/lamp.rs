@@ -119,3 +119,75 @@ impl LampDescription {
         Value::Object(super::write_table(self))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    //! Each key of a lamp changes its node.
+
+    use super::*;
+    use serde_json::json;
+
+    fn node(table: Value) -> Node {
+        let Value::Object(table) = table else { panic!("{table} is no table") };
+        LampDescription::read(&table, 3).unwrap().node().unwrap()
+    }
+
+    fn light(table: Value) -> PunctualLight {
+        node(table).light.unwrap()
+    }
+
+    #[test]
+    fn a_lamp_with_a_position_alone_is_a_white_point_of_strength_1() {
+        let lamp = node(json!({ "position": [1, 2, 3] }));
+        let expected = PunctualLight {
+            kind: PunctualLightKind::Point,
+            color: Vec3::splat(PI as f32),
+            range: f32::INFINITY,
+            radius: 0.0,
+        };
+        assert_eq!((lamp.name.as_str(), lamp.light), ("lamp 3", Some(expected)));
+        assert_eq!(lamp.transform.matrix().translation, DVec3::new(1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn color_strength_range_and_radius_are_those_of_the_light() {
+        let lamp = light(json!({
+            "position": [0, 0, 1], "color": "#00ff00", "strength": 2, "range": 7.5, "radius": 0.25,
+        }));
+        assert_eq!(lamp.color, Vec3::new(0.0, 2.0 * PI as f32, 0.0));
+        assert_eq!((lamp.range, lamp.radius), (7.5, 0.25));
+    }
+
+    #[test]
+    fn the_angle_of_a_spot_is_that_of_its_whole_cone_over_a_fraction_of_which_it_fades() {
+        let cone_deg = |angle: f64, blend: f64| {
+            let spot = json!({
+                "kind": "spot", "position": [0, 0, 1], "angle": angle, "blend": blend,
+            });
+            match light(spot).kind {
+                PunctualLightKind::Spot { inner_rad, outer_rad } => {
+                    [inner_rad, outer_rad].map(|rad| rad.to_degrees().round())
+                }
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(cone_deg(90.0, 0.0), [45.0, 45.0]);
+        assert_eq!(cone_deg(120.0, 0.5), [30.0, 60.0]);
+        assert_eq!(cone_deg(60.0, 1.0), [0.0, 30.0]);
+    }
+
+    #[test]
+    fn spots_and_directional_lamps_shine_at_their_target() {
+        let ahead = |table: Value| node(table).transform.matrix().transform_vector3(-DVec3::Z);
+        let spot = json!({ "kind": "spot", "position": [1, 2, 3], "target": [1, 7, 3] });
+        assert!(ahead(spot).distance(DVec3::Y) < 1e-12);
+        let origin = json!({ "kind": "spot", "position": [0, 0, 5] });
+        assert!(ahead(origin).distance(-DVec3::Z) < 1e-12);
+        let sideways = json!({ "kind": "directional", "position": [9, 0, 4], "target": [2, 0, 4] });
+        assert!(ahead(sideways.clone()).distance(-DVec3::X) < 1e-12);
+        assert_eq!(light(sideways).kind, PunctualLightKind::Directional);
+        // Without a position light comes from above, wherever the target is.
+        let from_above = json!({ "kind": "directional", "target": [5, 5, 5] });
+        assert!(ahead(from_above).distance(-DVec3::Z) < 1e-12);
+    }
+}

@@ -257,6 +257,37 @@ mod tests {
     }
 
     #[test]
+    fn each_property_of_the_text_is_one_of_the_material() {
+        let material = |text: &str| parse(text).unwrap().1.material();
+        let color = Vec3::new(1.0, 0.0, 0.0);
+        let attenuation_color = Vec3::new(1.0, 1.0, 1e-4);
+        let emissive = Vec3::new(0.0, 0.0, 1.0);
+        let matte = || Material::MATTE;
+        for (property, expected) in [
+            ("color=#f00", Material { base_color: color, ignores_vertex_colors: true, ..matte() }),
+            ("alpha=0.25", Material { alpha: 0.25, alpha_mode: AlphaMode::Blend, ..matte() }),
+            ("metallic=0.75", Material { metallic: 0.75, ..matte() }),
+            ("roughness=0.5", Material { roughness: 0.5, ..matte() }),
+            ("ior=1.25", Material { ior: 1.25, ..matte() }),
+            ("transmission=0.5", Material { transmission: 0.5, ..matte() }),
+            // No light at all would be lost to rounding.
+            ("attenuation-color=#ff0", Material { attenuation_color, ..matte() }),
+            ("attenuation-distance=2.5", Material { attenuation_distance: 2.5, ..matte() }),
+            ("thin=true", Material { is_thin: true, ..matte() }),
+            ("emissive=#00f", Material { emissive, ..matte() }),
+            ("emissive-strength=3", Material { emissive_strength: 3.0, ..matte() }),
+        ] {
+            assert_eq!(material(&format!("matte:{property}")), expected, "{property}");
+        }
+        let pane = Material { is_thin: true, transmission: 0.5, alpha: 0.5, ..Material::GLASS };
+        let pane = Material { alpha_mode: AlphaMode::Blend, ..pane };
+        assert_eq!(material("glass:thin=true,transmission=0.5,alpha=0.5"), pane);
+        // A property that the kind has can be taken away.
+        let dull = Material { emissive_strength: 0.0, ..Material::EMISSIVE };
+        assert_eq!(material("emissive:emissive-strength=0"), dull);
+    }
+
+    #[test]
     fn text_reads_back_equal() {
         for text in
             ["glass:color=#88ccff,ior=1.33", "plastic", "matte:attenuation-distance=2,thin=true"]

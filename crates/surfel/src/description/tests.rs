@@ -3,9 +3,14 @@
 use super::*;
 use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
+use surfel_core::points::{
+    Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, Preparation, Radius,
+    StructureChoice, Subsample,
+};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Camera, Projection, Track};
-use surfel_core::surface::SurfaceKind;
+use surfel_core::surface::{Align, GatherLimit, SurfaceKind, SurfaceOptions};
 
 fn parse(text: &str) -> Result<SceneDescription, Invalid> {
     SceneDescription::parse(text, false, Path::new("/data"))
@@ -221,6 +226,62 @@ fn settings_of_an_object_override_those_of_the_scene() {
     let own = scene.objects[0].settings.over(&scene.objects_default);
     assert_eq!(own.surface.surface(), SurfaceKind::Disc);
     assert_eq!((own.preparation.normals_k, own.preparation.normals_radius), (None, Some(1.0)));
+}
+
+#[test]
+fn keys_of_the_surface_are_its_options() {
+    let options = |text: &str| parse(text).unwrap().objects_default.surface.options();
+    assert_eq!(options(""), SurfaceOptions::default());
+    let text = "align = \"nearest\"\ngather-limit = \"nearest\"\nmin-distance = 3\nreach = 1.5\n\
+        density = 7\ndegree = 3";
+    let expected = SurfaceOptions {
+        align: Align::Nearest,
+        gather_limit: GatherLimit::Nearest,
+        min_distance: Some(3.0),
+        reach: Some(1.5),
+        density: 7,
+        degree: 3,
+    };
+    assert_eq!(options(text), expected);
+    let (of_scene, default) = (parse(text).unwrap(), SurfaceOptions::default());
+    let own = parse("[[object]]\nfile = \"a.ply\"\nalign = \"each\"\nreach = 2").unwrap();
+    let own = own.objects[0].settings.over(&of_scene.objects_default).surface.options();
+    assert_eq!(own, SurfaceOptions { align: Align::Each, reach: Some(2.0), ..expected });
+    // No value above is the default, which would hide that a key is not read.
+    assert!(expected.align != default.align && expected.gather_limit != default.gather_limit);
+    assert!(expected.density != default.density && expected.degree != default.degree);
+}
+
+#[test]
+fn keys_of_the_preparation_are_its_settings() {
+    let text = "duplicates = \"keep\"\nclass = [7]\nmixed-pixels = \"keep\"\nsubsample = \"first:9\"\n\
+        remove-outliers = \"radius:2,5\"\ndenoise = \"off\"\nneighbors = \"grid\"\nnormals-k = 12\n\
+        orient = \"up\"\nradius = 0.25\nstructure = \"scatter\"\nfree-space = false\n\
+        color = \"surface_variation\"";
+    let expected = Preparation {
+        duplicates: Duplicates::Keep,
+        kept_noise: vec![7],
+        mixed_pixels: MixedPixels::Keep,
+        subsample: Some(Subsample::First(9)),
+        remove_outliers: Some(OutlierRemoval::Radius { radius: 2.0, count: 5 }),
+        denoise: Denoise::Off,
+        neighbors: NeighborMethod::Grid,
+        normals: Neighborhood::Nearest(12),
+        estimates_normals: true,
+        orientation: Orientation::Up,
+        radii_from_normals: false,
+        radius: Radius::Fixed(0.25),
+        structure: StructureChoice::Scatter,
+        free_space: false,
+        keep_variation: true,
+        seed: 3,
+    };
+    let preparation = |text: &str| parse(text).unwrap().objects_default.preparation(3);
+    assert_eq!(preparation(text), expected);
+    let within = preparation(&text.replace("normals-k = 12", "normals-radius = 1.5"));
+    assert_eq!(within, Preparation { normals: Neighborhood::Within(1.5), ..expected });
+    let plain = Preparation { orientation: Orientation::Station, seed: 3, ..Default::default() };
+    assert_eq!(preparation(""), plain);
 }
 
 #[test]

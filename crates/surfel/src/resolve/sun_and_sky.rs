@@ -375,6 +375,25 @@ mod tests {
     }
 
     #[test]
+    fn the_strength_of_an_environment_multiplies_its_radiance() {
+        let map = Environment::new(2, 1, vec![Vec3::new(0.5, 1.0, 2.0); 2], Vec3::Z, 0.0).unwrap();
+        let radiance = |strength: Option<f64>| {
+            let mut description = SceneDescription::default();
+            description.light.environment = Some("sky.hdr".into());
+            description.light.environment_strength = strength;
+            let points = PointCloud::default();
+            let chosen = choose_lights(&description, &context(DVec3::Y, &points), &NoProgress);
+            match &lights(&chosen, Some(&map), Vec3::Z, false).unwrap()[..] {
+                [Light::Environment(environment)] => environment.radiance(Vec3::Y),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(radiance(None), Vec3::new(0.5, 1.0, 2.0));
+        assert_eq!(radiance(Some(4.0)), Vec3::new(2.0, 4.0, 8.0));
+        assert_eq!(radiance(Some(0.0)), Vec3::ZERO);
+    }
+
+    #[test]
     fn the_sky_is_the_background_of_a_closed_room_if_it_is_asked_for() {
         let kinds = |background: Option<Background>| {
             let points = PointCloud::default();
