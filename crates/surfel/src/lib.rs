@@ -74,6 +74,7 @@ mod renderer;
 mod built_scene;
 pub mod ray_query;
 pub mod animate;
+mod point_source;
 pub mod prepare;
 mod scene_keys;
 mod known_trees;

@@ -1,23 +1,22 @@
 //! Clouds that are read or prepared and kept, rather than rendered.
 
 use crate::crs::{move_to_metres, report_degrees};
-use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
+use crate::description::{ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
+pub use crate::point_source::PointSource;
 use crate::resolve::{
-    MemoryEstimate, check_empty, filter_cloud, report_denoise, report_normals, report_radii,
+    MemoryEstimate, check_empty, report_denoise, report_normals, report_radii,
     report_unused_of_files, report_unused_structure,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use surfel_core::math::DAffine3;
-use std::sync::Arc;
 use surfel_core::points::{
     Denoise, Duplicates, MixedPixels, NoisePoints, Orientation, PointCloud, Preparation, STRUCTURE,
     StructureChoice, denoise, prepare, select_points,
 };
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
-use surfel_formats::{ColumnChoice, FileInfo, LoadOptions, Loaded, merge_loaded};
+use surfel_formats::{ColumnChoice, FileInfo, Loaded, merge_loaded};
 
 /// Columns that a prepared cloud gets besides those that follow from the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,57 +37,6 @@ struct Columns {
 impl Columns {
     fn any(&self) -> bool {
         self.normals || self.radii || self.variation
-    }
-}
-
-/// Points that are read or prepared.
-#[derive(Clone, Debug)]
-pub enum PointSource {
-    /// The points of a file.
-    File(PathBuf),
-    /// A cloud in memory, and what is known about the file that it came from.
-    Cloud(Arc<PointCloud>, Box<FileInfo>),
-}
-
-impl PointSource {
-    /// Returns the name of the source in messages: its path, or its number among all.
-    fn name(&self, index: usize) -> PathBuf {
-        match self {
-            Self::File(file) => file.clone(),
-            Self::Cloud(..) => PathBuf::from(format!("cloud {index}")),
-        }
-    }
-
-    /// Returns what is known about the points before they are read.
-    fn inspect(&self) -> surfel_formats::Result<FileInfo> {
-        match self {
-            Self::File(file) => surfel_formats::inspect(file),
-            Self::Cloud(cloud, info) => {
-                Ok(FileInfo { n_points: Some(cloud.len() as u64), ..(**info).clone() })
-            }
-        }
-    }
-
-    /// Returns the points that meet the filters.
-    fn read(
-        self,
-        options: &LoadOptions,
-        settings: &PreparationSettings,
-        progress: &dyn Progress,
-    ) -> Result<Loaded> {
-        match self {
-            Self::File(file) => Ok(surfel_formats::load(&file, options, progress)?),
-            Self::Cloud(cloud, info) => {
-                let none = cloud.subset(&[]);
-                let cloud = Arc::unwrap_or_clone(cloud);
-                let cloud = match filter_cloud(cloud, &DAffine3::IDENTITY, settings, progress) {
-                    // Other sources may have points that meet the filters.
-                    Err(Error::NoPointKept { .. }) => none,
-                    filtered => filtered?,
-                };
-                Ok(Loaded { cloud, info: *info })
-            }
-        }
     }
 }
 
@@ -279,7 +227,9 @@ mod tests {
 
     use super::*;
     use crate::crs::{CoordinateSystem, Unit};
+    use crate::description::PreparationSettings;
     use crate::progress_log::{ProgressLog, Records};
+    use std::sync::Arc;
     use surfel_core::math::{DVec3, Vec3};
     use surfel_core::points::{
         COLUMN_INDEX, ROW_INDEX, Radius, Scalar, ScanStation, Subsample, Values,
@@ -479,7 +429,7 @@ mod tests {
         let prepared = |noise_points| {
             let mut cloud = two_walls();
             cloud.classification = Some((0..200).map(|i| if i < 9 { 7 } else { 2 }).collect());
-            let (loaded, choices) = prepare_with(cloud, |settings| {
+            let (loaded, Records { choices, .. }) = prepare_with(cloud, |settings| {
                 settings.duplicates = Some(Duplicates::Keep);
                 settings.noise_points = noise_points;
             });

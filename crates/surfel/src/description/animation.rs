@@ -2,7 +2,8 @@
 
 use super::keys::{KeyedSettings, settings};
 use super::object::{Rotation, RotationRule, ScaleRule};
-use super::rule::{Checked, FINITE, Flag, List, OneOf, POSITIVE, Text, VIEW_ANGLE, Vector};
+use super::rule::{Checked, FINITE, Flag, List, OneOf, POSITIVE, Text, VIEW_ANGLE};
+use super::vector_rule::Vector;
 use super::{Invalid, read_table};
 use serde_json::{Map, Value};
 use std::f64::consts::TAU;

@@ -3,9 +3,8 @@
 use super::Invalid;
 use super::keys::settings;
 use super::place::{CrsRule, PlaceRule};
-use super::rule::{
-    Arity, Axis, Checked, Direction, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
-};
+use super::rule::{Arity, Checked, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, number};
+use super::vector_rule::{Axis, Direction, Vector};
 use crate::crs::Place;
 use serde_json::{Value, json};
 use std::path::Path;

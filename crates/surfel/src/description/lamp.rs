@@ -2,7 +2,8 @@
 
 use super::color_rule::Color;
 use super::keys::settings;
-use super::rule::{Checked, OneOf, Text, Vector, number};
+use super::rule::{Checked, OneOf, Text, number};
+use super::vector_rule::Vector;
 use super::{Invalid, read_table};
 use serde_json::{Map, Value};
 use std::f64::consts::PI;

@@ -31,6 +31,7 @@ mod preparation_rule;
 pub mod rule;
 mod section;
 mod table;
+mod vector_rule;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
 pub use camera::{CameraSettings, Interior, OrthographicHeight, WorldSettings};

@@ -2,9 +2,8 @@
 
 use super::keys::{KeyedSettings, settings};
 use super::material::{MaterialDescription, MaterialRule};
-use super::rule::{
-    Checked, FINITE, Flag, List, MAX_LENGTH, Rule, Text, Vector, absolute_text, as_number,
-};
+use super::rule::{Checked, FINITE, Flag, List, MAX_LENGTH, Rule, Text, absolute_text, as_number};
+use super::vector_rule::Vector;
 use super::{
     Invalid, ObjectSettings, read_value, take_normalized, unknown_key, write_parts, write_table,
 };

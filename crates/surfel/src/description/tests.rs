@@ -5,8 +5,8 @@ use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, Preparation, Radius,
-    StructureChoice, Subsample,
+    Denoise, Duplicates, MixedPixels, NoisePoints, Orientation, OutlierRemoval, Preparation,
+    Radius, StructureChoice, Subsample,
 };
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Camera, Projection, Track};
@@ -255,12 +255,14 @@ fn keys_of_the_surface_are_its_options() {
 #[test]
 fn keys_of_the_preparation_are_its_settings() {
     let text = "duplicates = \"keep\"\nclass = [7]\nmixed-pixels = \"keep\"\nsubsample = \"first:9\"\n\
+        noise-points = \"keep\"\n\
         remove-outliers = \"radius:2,5\"\ndenoise = \"off\"\nneighbors = \"grid\"\nnormals-k = 12\n\
         orient = \"up\"\nradius = 0.25\nstructure = \"scatter\"\nfree-space = false\n\
         color = \"surface_variation\"";
     let expected = Preparation {
         duplicates: Duplicates::Keep,
         kept_noise: vec![7],
+        noise_points: NoisePoints::Keep,
         mixed_pixels: MixedPixels::Keep,
         subsample: Some(Subsample::First(9)),
         remove_outliers: Some(OutlierRemoval::Radius { radius: 2.0, count: 5 }),
