@@ -1,4 +1,4 @@
-//! Where points come from: files, and clouds in memory.
+//! Sources of points: files, and clouds in memory.
 
 use crate::description::PreparationSettings;
 use crate::error::{Error, Result};
