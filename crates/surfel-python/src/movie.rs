@@ -12,7 +12,6 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use surfel::RenderedImage;
 use surfel::animate::{BuiltMovie, PlannedMovie, check_movie};
 use surfel::description::Invalid;
 use surfel::locks::lock_unless_cancelled;
