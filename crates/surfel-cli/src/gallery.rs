@@ -103,6 +103,7 @@ elevation = 32
 
 [[object]]
 file = "demo.laz"
+orient = "mst"
 
 # Points of a ball: 60 thousand of them, no mesh.
 [[object]]
