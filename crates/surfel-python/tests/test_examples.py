@@ -34,7 +34,7 @@ def test_examples_run(name, hill, tmp_path):
     words = [sys.executable, EXAMPLES / f"{name}.py", hill, tmp_path / output, *words]
     example = subprocess.run([str(word) for word in words], capture_output=True, text=True)
     assert example.returncode == 0, example.stderr
-    written = sorted(tmp_path.iterdir())
+    written = sorted(path for path in tmp_path.iterdir() if not path.name.startswith("."))
     assert len(written) == (4 if "#" in output else 1) and all(100 < path.stat().st_size for path in written)
     if name == "shadow_hours":
         hours = numpy.load(tmp_path / output)

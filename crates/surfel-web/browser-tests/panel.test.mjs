@@ -260,24 +260,23 @@ test('the sun has the position of date and hour', async () => {
 });
 
 test('a rejected value is reverted, and the reason is shown beside its control', async () => {
-  await setters.slider('spp', 5000);
-  await page.locator('.toast', { hasText: 'spp: found 5000, expected at most 1024' }).waitFor();
-  await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
+  const error = page.locator('[data-row="filter"] .row-error');
+  await setters.text('filter', 'hight > 1');
+  await error.waitFor();
+  await page.waitForFunction(() => !window.surfel.state.scene.filter);
   assert.equal(await pixels(page), first);
-  const error = page.locator('[data-row="spp"] .row-error');
-  assert.equal(await error.textContent(), 'found 5000, expected at most 1024');
-  assert.ok(await error.isVisible());
+  assert.match(await error.textContent(), /^(?!filter).*hight/);
   assert.equal(await page.locator('.row-error:visible').count(), 1);
-  await setControl('spp', 3);
+  await setControl('filter', 'z > 149');
   assert.ok(await error.isHidden(), 'another value removes the error');
-  await resetControl('spp');
+  await setControl('filter', '');
 });
 
 test('messages after a rejection are answered', async () => {
   const before = await state(page, 'scene');
-  await setters.slider('spp', 5000);
-  await page.locator('.toast', { hasText: 'expected at most 1024' }).waitFor();
-  await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
+  await setters.text('filter', 'hight > 1');
+  await page.locator('[data-row="filter"] .row-error').waitFor();
+  await page.waitForFunction(() => !window.surfel.state.scene.filter);
   assert.deepEqual(await state(page, 'scene'), before);
   const { lastSeq: rejectedSeq, latencies_ms, lastFrame } = await page.evaluate(() => window.surfel.state);
   assert.ok(lastFrame.seq < rejectedSeq, 'no picture has the rejected value');
@@ -287,7 +286,7 @@ test('messages after a rejection are answered', async () => {
   await drag(page, await pixelAt(page, 0.4, 0.5), await pixelAt(page, 0.6, 0.5));
   await settled(page);
   const after = await page.evaluate(() => window.surfel.state);
-  assert.deepEqual([after.lastFrame.seq, after.scene.spp, after.scene.sun.azimuth], [after.lastSeq, 2, 30]);
+  assert.deepEqual([after.lastFrame.seq, after.scene.filter, after.scene.sun.azimuth], [after.lastSeq, before.filter, 30]);
   // One latency for each message that was answered, none for the rejected one.
   const answered = after.latencies_ms.slice(latencies_ms.length);
   assert.ok(2 <= answered.length && answered.length <= after.lastSeq - rejectedSeq, `${answered}`);
