@@ -87,11 +87,13 @@ impl CandidateSet for KNearest {
 }
 
 /// Returns the minimum with one instruction, unlike `f64::min`, which handles NaN.
+#[inline]
 fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 /// Returns the maximum with one instruction.
+#[inline]
 fn max(a: f64, b: f64) -> f64 {
     if b < a { a } else { b }
 }
