@@ -141,7 +141,8 @@ fn options(keys: &[&str]) -> Vec<String> {
     keys.iter().map(|key| format!("--{}", option_name(key))).collect()
 }
 
-/// Replaces the keys that messages of libraries name in brackets by their options.
+/// Replaces the keys that messages of libraries name in brackets at the end of a sentence by their options. Brackets in
+/// names of files and columns stay.
 fn with_options(text: &str) -> String {
     let known = SceneDescription::keys();
     // Movies are continued by an option that is no key.
@@ -149,12 +150,13 @@ fn with_options(text: &str) -> String {
     let replaced = |part: &str| {
         let (keys, rest) = part.split_once(']')?;
         let keys: Vec<&str> = keys.split(", ").collect();
-        let are_known = keys.iter().all(is_known);
-        are_known.then(|| format!("[{}]{rest}", options(&keys).join(", ")))
+        let ends = rest.is_empty() || [": ", "; ", ", "].iter().any(|next| rest.starts_with(next));
+        let are_keys = ends && keys.iter().all(is_known);
+        are_keys.then(|| format!(" [{}]{rest}", options(&keys).join(", ")))
     };
-    let mut parts = text.split('[');
+    let mut parts = text.split(" [");
     let start = parts.next().unwrap_or_default().to_owned();
-    let others = parts.map(|part| replaced(part).unwrap_or_else(|| format!("[{part}")));
+    let others = parts.map(|part| replaced(part).unwrap_or_else(|| format!(" [{part}")));
     others.fold(start, |text, part| text + &part)
 }
 
@@ -229,6 +231,8 @@ mod tests {
             ("two numbers as in [0, 255]", "as in [0, 255]"),
             ("object[2].file: no [salvage", "object[2].file: no [salvage"),
             ("all [color, colour]", "all [color, colour]"),
+            ("scan[color].laz: 9 points", "scan[color].laz: 9 points"),
+            ("a [filter].laz: 9 points", "a [filter].laz: 9 points"),
         ] {
             assert!(with_options(text).ends_with(expected), "{}", with_options(text));
         }
