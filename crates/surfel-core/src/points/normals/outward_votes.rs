@@ -117,7 +117,8 @@ impl FreeRays<'_> {
             let Some(nearest) = self.tree.nearest(at, 1, None).first().copied() else { break };
             let spacing = self.spacings[nearest.index as usize];
             let to_surface = nearest.distance_squared.sqrt() - HIT_DISTANCE * spacing;
-            if to_surface < 0.0 {
+            // Where points coincide, their spacing is 0.
+            if to_surface <= 0.0 {
                 break;
             }
             length += to_surface.max(MIN_STEP * spacing);
@@ -128,17 +129,17 @@ impl FreeRays<'_> {
 
 #[cfg(test)]
 mod tests {
-    //! Votes of points on closed, open and hollow surfaces.
+    //! Votes of points on a ball, on the ground, on a wall, and in one place.
 
     use super::*;
     use crate::math::Random;
-    use crate::points::neighbors::Neighborhood;
+    use crate::points::neighbors::{Neighbor, Neighborhood};
     use crate::progress::NoProgress;
 
     /// Returns the votes of all points.
     fn votes(positions: &[Vec3], normals: &[Vec3]) -> Vec<f32> {
         let tree = KdTree::new(positions, &NoProgress).unwrap();
-        let farthest = |_, neighbors: &[crate::points::neighbors::Neighbor]| {
+        let farthest = |_, neighbors: &[Neighbor]| {
             neighbors.last().map_or(0.0, |neighbor| neighbor.distance_squared.sqrt())
         };
         let spacings = tree.map(Neighborhood::Nearest(8), &NoProgress, farthest).unwrap();
