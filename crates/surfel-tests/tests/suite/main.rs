@@ -20,6 +20,7 @@ mod many_instances;
 mod materials;
 mod neighbors;
 mod octree;
+mod orientation;
 mod packet_groups;
 mod punctual_lights;
 mod quality;
