@@ -100,22 +100,29 @@ mod tests {
     }
 
     #[test]
-    fn a_floor_of_few_vertices_is_no_outlier_of_the_ball_on_it() {
+    fn a_mesh_of_few_vertices_is_no_outlier_of_the_ball_beside_it() {
         let mut random = Random::new(4, 0);
         let mut axis = || 2.0 * random.next_f32() - 1.0;
-        let ball = (0..20_000).map(|_| Vec3::new(axis(), axis(), axis()).normalize()).collect();
-        let ball = Geometry::Points(PointCloud::from_positions(ball));
+        let ball: Vec<Vec3> =
+            (0..20_000).map(|_| Vec3::new(axis(), axis(), axis()).normalize()).collect();
+        let indices: Vec<u32> = (0..19_998).collect();
+        let triangles = indices.chunks(3).map(|it| [it[0], it[1], it[2]]).collect();
+        let mesh = Mesh { positions: ball.clone(), triangles, ..Mesh::default() };
+        let cloud = Geometry::Points(PointCloud::from_positions(ball));
         let corner = |i: i32| Vec3::new((i % 2) as f32 - 0.5, (i / 2) as f32 - 0.5, -0.1) * 10.0;
         let corners: Vec<Vec3> = (0..4).map(corner).collect();
         let triangles = vec![[0, 1, 2], [1, 3, 2]];
         let floor = Mesh { positions: corners.clone(), triangles, ..Mesh::default() };
-        let mut graph = Graph::from_geometry(ball, Material::default());
-        graph.append(Graph::from_geometry(Geometry::Triangles(floor), Material::default()));
-        let camera = fit_camera(&graph.sample_points(), &CameraFit::default());
-        let view = camera.view(DVec3::ZERO, 1600, 900);
-        for corner in corners {
-            let (x, y, _) = view.project(corner).unwrap();
-            assert!((0.0..1600.0).contains(&x) && (0.0..900.0).contains(&y), "{x} {y}");
+        for ball in [cloud, Geometry::Triangles(mesh)] {
+            let mut graph = Graph::from_geometry(ball, Material::default());
+            let floor = Geometry::Triangles(floor.clone());
+            graph.append(Graph::from_geometry(floor, Material::default()));
+            let camera = fit_camera(&graph.sample_points(), &CameraFit::default());
+            let view = camera.view(DVec3::ZERO, 1600, 900);
+            for corner in &corners {
+                let (x, y, _) = view.project(*corner).unwrap();
+                assert!((0.0..1600.0).contains(&x) && (0.0..900.0).contains(&y), "{x} {y}");
+            }
         }
     }
 

@@ -305,14 +305,14 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         self.sample_points_of(&self.visible_nodes())
     }
 
-    /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true. Beside clouds,
-    /// meshes of few vertices have points on their triangles, so that they do not count as outliers. Of several clouds, each
-    /// is a part of its own, as a column of the sample tells.
+    /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true. Meshes of few
+    /// vertices have points on their triangles, so that they do not count as outliers of clouds or of other meshes. Of
+    /// several clouds, each is a part of its own, as a column of the sample tells.
     pub fn sample_points_of(&self, is_chosen: &[bool]) -> PointCloud {
         const MAX_POINTS: usize = 400_000;
         /// Number of points of each cloud that has so many, unless there are very many clouds.
         const MIN_POINTS_OF_CLOUD: usize = 1000;
-        /// Number of points on all meshes as a fraction of those of all clouds.
+        /// Number of points on all meshes as a fraction of those of all clouds, or of the vertices where there are none.
         const MESH_FRACTION: f64 = 0.25;
         let world = self.world_from_nodes();
         let nodes = self.nodes.iter().zip(&world).zip(is_chosen).filter(|(_, chosen)| **chosen);
@@ -326,9 +326,10 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         let clouds =
             instances.iter().filter(|(geometry, _)| matches!(geometry, Geometry::Points(_)));
         let sizes: Vec<usize> = clouds.map(|(geometry, _)| geometry.positions().len()).collect();
-        let (n_clouds, n_of_clouds) = (sizes.len(), sizes.iter().sum::<usize>());
+        let n_clouds = sizes.len();
         let n_meshes = instances.len() - n_clouds;
-        let n_on_mesh = (MESH_FRACTION * (n_of_clouds / step) as f64) as usize / n_meshes.max(1);
+        let n_compared = if n_clouds == 0 { n_points } else { sizes.iter().sum() };
+        let n_on_mesh = (MESH_FRACTION * (n_compared / step) as f64) as usize / n_meshes.max(1);
         let min_of_cloud = MIN_POINTS_OF_CLOUD.min(MAX_POINTS / n_clouds.max(1)).max(1);
         let (mut points, mut parts, mut n_parts) = (Vec::new(), Vec::new(), 0i32);
         for (geometry, world) in instances {
