@@ -23,7 +23,7 @@ use surfel_tests::backends;
 use surfel_tests::clouds::waves;
 use surfel_tests::scenes;
 
-/// Distance of the farthest things that darken the sky, as a fraction of the diagonal of the cloud's bounding box.
+/// Distance of the farthest surfaces that hide the sky, as a fraction of the diagonal of the cloud's bounding box.
 const AO_FRACTION: f32 = 0.1;
 
 /// The options of the command line.

@@ -236,7 +236,7 @@ fn one_point_and_a_line_are_in_the_picture() {
         let text = stderr(&output);
         assert!(!text.contains("of the picture is covered"), "{text}");
         let has_one = name != "line.xyz";
-        for of_neighbours in ["th neighbour", "darken the sky"] {
+        for of_neighbours in ["th neighbour", "ambient occlusion by"] {
             assert_eq!(text.contains(of_neighbours), !has_one, "{of_neighbours}: {text}");
         }
         assert!(!text.contains("from planes through"), "{text}");

@@ -68,7 +68,7 @@ settings! {
     pub struct SkySettings {
         /// Multiplies the light of the sky.
         strength: f64 = 1.0, GAIN, "FACTOR";
-        /// Distance in world units up to which things darken the sky [default: 0.15 of the scene's diagonal].
+        /// Distance in world units up to which surfaces hide the sky: ambient occlusion [default: 0.15 of the scene's diagonal].
         ao_distance: f64, POSITIVE, "LENGTH";
     }
 }

@@ -23,9 +23,11 @@ pub fn report_coverage(image: &Image, progress: &dyn Progress) {
             percent => format!("only {percent:.2} %"),
         };
         let line = format!(
-            "{share} of the picture is covered; move the camera nearer, or give points a larger radius"
+            "{share} of the picture is covered; move the camera nearer, keep a part of the points alone, or give them a \
+             larger radius"
         );
-        progress.warning(&line, &["camera.zoom_factor", "camera.focal_point", "radius"]);
+        let keys = ["camera.zoom_factor", "camera.focal_point", "crop", "radius"];
+        progress.warning(&line, &keys);
     }
 }
 

@@ -27,7 +27,7 @@ const SUN_OFFSET_DEG: f64 = 60.0;
 /// Minimum ratio of the light that a sun on the right gives to that of one on the left, at which it stands on the right.
 const MIN_GAIN_ON_RIGHT: f32 = 1.15;
 
-/// Fraction of the scene's diagonal up to which things darken the sky.
+/// Fraction of the scene's diagonal up to which surfaces hide the sky.
 const AO_FRACTION: f32 = 0.15;
 
 /// Radiance of the headlight on a surface that faces it.
@@ -183,7 +183,7 @@ fn choose_sun(settings: &mut SunSettings, context: &LightingContext, progress: &
     if settings.azimuth.is_none() {
         let (azimuth_deg, elevation_deg) = (automatic_azimuth_deg(context), settings.elevation());
         let line = format!(
-            "sun from {azimuth_deg:.0} degrees (0 = north, 90 = east), {elevation_deg:.0} high"
+            "sun at azimuth {azimuth_deg:.0} degrees (0 = north, 90 = east), elevation {elevation_deg:.0} degrees"
         );
         progress.choice(&line, &["sun.azimuth", "sun.elevation"]);
         settings.azimuth = Some(azimuth_deg);
@@ -196,7 +196,8 @@ fn choose_sky(settings: &mut SkySettings, context: &LightingContext, progress: &
         let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
         // A single point darkens nothing.
         if 0.0 < context.diagonal {
-            let line = format!("things up to {} away darken the sky", format_length(distance));
+            let line =
+                format!("ambient occlusion by surfaces up to {} away", format_length(distance));
             progress.choice(&line, &["sky.ao_distance"]);
         }
         settings.ao_distance = Some(distance.into());

@@ -39,7 +39,7 @@ pub fn stand_sun_at_date(
     let (azimuth_deg, elevation_deg) = sun_angles_deg(place, &date)
         .ok_or_else(|| Invalid::at("sun", "the position of the sun is not known for this date"))?;
     let line = format!(
-        "sun from {azimuth_deg:.1} degrees of true north, {elevation_deg:.1} high, at {:.4},{:.4} on {}",
+        "sun at azimuth {azimuth_deg:.1} degrees from true north, elevation {elevation_deg:.1} degrees, at {:.4},{:.4} on {}",
         place.latitude_deg,
         place.longitude_deg,
         date.format("%Y-%m-%d %H:%M %:z")

@@ -84,7 +84,8 @@ pub fn remove_outliers(
     let is_kept = |point: &u32| f64::from(values[*point as usize]) <= limit;
     let kept: Vec<u32> = (0..cloud.len() as u32).filter(is_kept).collect();
     let n_outliers = cloud.len() - kept.len();
-    progress.note(&format!("{removal} removed {n_outliers} of {}", counted(cloud.len(), "point")));
+    let points = counted(cloud.len(), "point");
+    progress.note(&format!("{n_outliers} of {points} removed as outliers, by {removal}"));
     Ok(cloud.subset(&kept))
 }
 

@@ -186,7 +186,7 @@ impl RadiusReport {
     pub fn line(&self, radius: Radius) -> String {
         let [min, median, max] = [self.min, self.median, self.max].map(format_length);
         let by_structure =
-            if self.follows_structure { ", or what lines, leaves and gaps ask for" } else { "" };
+            if self.follows_structure { ", other radii at lines, leaves and gaps" } else { "" };
         match radius {
             Radius::Fixed(_) => format!("radius {median}, as given"),
             Radius::Median { n, .. } => {
@@ -212,8 +212,8 @@ impl RadiusReport {
 
     fn lines(&self) -> Vec<String> {
         let clamped = format!(
-            "radii of {} clamped to {MAX_OUTLIER_RATIO} times their neighbours'",
-            counted(self.n_clamped, "outlier")
+            "{} far from all others: radii limited to {MAX_OUTLIER_RATIO} times those of the nearest points",
+            counted(self.n_clamped, "point")
         );
         let replaced = format!(
             "zero radii of {} set to {}",
@@ -424,7 +424,7 @@ mod tests {
         assert_eq!(line, "radii 0.459 to 7.63, median 0.701: the distance to the 12th neighbour");
         let of_shapes = RadiusReport { follows_structure: true, ..report };
         let line = of_shapes.line(Radius::Adaptive { k: 12 });
-        assert!(line.ends_with("12th neighbour, or what lines, leaves and gaps ask for"), "{line}");
+        assert!(line.ends_with("12th neighbour, other radii at lines, leaves and gaps"), "{line}");
         assert_eq!([1, 2, 3, 11, 22].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd"]);
     }
 

@@ -109,7 +109,9 @@ impl StructureReport {
             0 => line,
             _ => {
                 let points = counted(n_redundant, "point");
-                format!("{line}; {points} of the surface not drawn, since others cover them")
+                format!(
+                    "{line}; {points} of dense surfaces not drawn, as others cover the same place"
+                )
             }
         }
     }
