@@ -30,6 +30,12 @@ const MIN_COSINE: f32 = 0.9;
 const MAX_SLOPE: f32 = 0.15;
 /// Ratio of the radius of a widened disc to the width of the gap.
 const OVERLAP: f32 = 1.25;
+/// Ratio of the radius of a widened disc to its radius before from which its plane must be that of the other side more
+/// exactly: its rim would stand out otherwise.
+const FAR_WIDENING: f32 = 3.0;
+/// Minimum cosine and maximum slope of such discs.
+const MIN_FAR_COSINE: f32 = 0.985;
+const MAX_FAR_SLOPE: f32 = 0.08;
 
 /// Returns the octants around a normal in which the neighbours lie.
 fn octants_of(positions: &[Vec3], point: usize, neighbors: &[Neighbor], basis: &Basis) -> Octants {
@@ -91,6 +97,15 @@ struct Side {
     point: u32,
     /// Octants in which it has neighbours within its disc.
     octants: Octants,
+}
+
+impl Side {
+    /// True if the side has a gap at an octant, and no other gap: beyond a corner no points lie.
+    fn is_closed_by(&self, octant: usize) -> bool {
+        let mut octants = self.octants;
+        octants.insert(octant);
+        !self.octants.contains(octant) && !octants.has_gap(MIN_EMPTY)
+    }
 }
 
 /// Returns the points whose neighbours leave a gap, and those whose discs were widened to reach neighbours all around.
@@ -184,7 +199,7 @@ fn widened(
 
         if distance == 0.0
             || seen.contains(octant_of_other)
-            || !is_one_surface(&shape, other_shape, offset)
+            || !is_one_surface(&shape, other_shape, offset, MIN_COSINE, MAX_SLOPE)
         {
             continue;
         }
@@ -194,7 +209,10 @@ fn widened(
             radius = radius.max(reach);
         }
         let octant_of_own = octant_around(&Basis::around(other_shape.normal), -offset);
-        if other_shape.radius < reach && !other.octants.contains(octant_of_own) {
+        if other_shape.radius < reach
+            && other.is_closed_by(octant_of_own)
+            && can_reach(other_shape, &shape, offset, reach)
+        {
             widened.push((other.point, reach));
         }
     }
@@ -207,10 +225,22 @@ fn widened(
     widened
 }
 
-/// True if two discs lie in one plane. `offset` leads from the first to the second.
-fn is_one_surface(a: &PointShape, b: &PointShape, offset: Vec3) -> bool {
+/// True if a disc can be widened to `reach` so that it lies on the surface of another disc.
+fn can_reach(disc: &PointShape, other: &PointShape, offset: Vec3, reach: f32) -> bool {
+    reach < FAR_WIDENING * disc.radius
+        || is_one_surface(disc, other, offset, MIN_FAR_COSINE, MAX_FAR_SLOPE)
+}
+
+/// True if two discs lie in one plane, up to an angle and a slope. `offset` leads from one to the other.
+fn is_one_surface(
+    a: &PointShape,
+    b: &PointShape,
+    offset: Vec3,
+    min_cosine: f32,
+    max_slope: f32,
+) -> bool {
     let height = a.normal.dot(offset).abs().max(b.normal.dot(offset).abs());
-    MIN_COSINE < a.normal.dot(b.normal).abs() && height < MAX_SLOPE * offset.length()
+    min_cosine < a.normal.dot(b.normal).abs() && height < max_slope * offset.length()
 }
 
 #[cfg(test)]
@@ -252,5 +282,32 @@ mod tests {
         assert!(5 * n_inside < at_gap.len(), "{n_inside} of {}", at_gap.len());
         let around_nothing = radii(0.0);
         assert!(!around_nothing.iter().any(is_wide), "an open border stays as it is");
+    }
+
+    #[test]
+    fn discs_are_widened_far_only_in_the_plane_of_the_other_side() {
+        let disc = |tilt_deg: f32, radius: f32| {
+            let (sin, cos) = tilt_deg.to_radians().sin_cos();
+            let structure = Structure::Surface;
+            PointShape { structure, normal: Vec3::new(sin, 0.0, cos), radius }
+        };
+        let level = disc(0.0, 2.0);
+        let can_reach = |tilt_deg: f32, radius: f32| {
+            can_reach(&disc(tilt_deg, radius), &level, 3.0 * Vec3::Y, 3.75)
+        };
+        assert!(can_reach(20.0, 1.5) && can_reach(3.0, 0.5));
+        assert!(!can_reach(12.0, 0.5));
+    }
+
+    #[test]
+    fn a_side_at_a_corner_has_another_gap() {
+        let side = |octants: &[usize]| {
+            let mut found = Octants::default();
+            octants.iter().for_each(|octant| found.insert(*octant));
+            Side { point: 0, octants: found }
+        };
+        let border = side(&[0, 1, 2, 3]);
+        assert!(border.is_closed_by(5) && !border.is_closed_by(2));
+        assert!(!side(&[0, 1]).is_closed_by(5));
     }
 }
