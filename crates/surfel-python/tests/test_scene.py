@@ -1,5 +1,8 @@
 """Scenes of clouds, meshes and files: places, materials, numbers of what was added."""
 
+import types
+import warnings
+
 import numpy
 import pytest
 import surfel
@@ -191,3 +194,14 @@ def test_rays_need_a_surface(points):
 def test_a_viewer_needs_something_to_show():
     with pytest.raises(surfel.InvalidSetting, match="object"):
         surfel.view(surfel.Scene())
+
+
+@pytest.mark.parametrize("keys", [{"color": "red"}, {"filter": "z > 0"}])
+def test_keywords_for_points_without_effect_on_a_mesh_are_told(points, keys):
+    scene = surfel.Scene(**SMALL)
+    scene.add(surfel.Cloud(points), **keys)
+    scene.add(SQUARE, name="board", translate=(5, 0, 0), **keys)
+    words = rf"object `board`: settings for points do not change triangles.* \[{list(keys)[0]}, material\]"
+    with pytest.warns(UserWarning, match=words) as caught:
+        scene.render()
+    assert len(caught) == 1
