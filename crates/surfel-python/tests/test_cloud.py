@@ -1,6 +1,9 @@
 """Clouds and meshes of arrays: what is taken, what is refused, and what becomes of it."""
 
 import array
+import copy
+import pickle
+import types
 
 import numpy
 import pytest
@@ -303,3 +306,42 @@ def test_buffers_of_the_standard_library_are_arrays():
     flat = array.array("d", range(12))
     cloud = surfel.Cloud(numpy.frombuffer(flat).reshape(4, 3))
     assert cloud.points.tolist() == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]]
+
+
+def masked(points, rows):
+    """The points with -9999 in some rows, which are masked."""
+    values = points.copy()
+    values[rows] = -9999
+    mask = numpy.zeros(values.shape, bool)
+    mask[rows] = True
+    return numpy.ma.array(values, mask=mask)
+
+
+@pytest.mark.parametrize("dtype", ["f8", "f4", "i4"])
+def test_masked_positions_count_as_not_measured(points, dtype):
+    values = masked((points * 1000).astype(dtype), slice(100, 200))
+    cloud = surfel.Cloud(values)
+    assert numpy.isnan(cloud.points[100:200]).all() and numpy.isfinite(cloud.points[200:]).all()
+    assert numpy.allclose(cloud.points[200:], values.data[200:], atol=1e-3)
+    scene = surfel.Scene()
+    scene.add(values)
+    assert -2000 < scene.bounds.min()
+    assert (surfel.Cloud(numpy.ma.array(points)).points == surfel.Cloud(points).points).all()
+
+
+def test_masked_columns_are_missing_or_refused(points):
+    n = len(points)
+    ages = numpy.ma.array(numpy.arange(n), mask=numpy.arange(n) < 7)
+    cloud = surfel.Cloud(points, intensity=ages, scalars={"age": ages, "whole": numpy.ma.array(numpy.arange(n, dtype="i4"))})
+    assert numpy.isnan(cloud.scalars["age"][:7]).all() and (cloud.scalars["age"][7:] == numpy.arange(7, n)).all()
+    assert numpy.isnan(cloud.intensity[:7]).all() and cloud.scalars["whole"].dtype == numpy.int32
+    for keywords, words in [
+        ({"classification": ages % 5}, r"classification: found 7 masked values, expected none; .*classification.filled\(0\)"),
+        ({"colors": masked(points, slice(0, 2)).astype("u1")}, "colors: found 6 masked values"),
+    ]:
+        with pytest.raises(surfel.InvalidArray, match=words):
+            surfel.Cloud(points, **keywords)
+    with pytest.raises(surfel.InvalidArray, match="vertices: found one that is not finite"):
+        surfel.Mesh(masked(points, slice(0, 1)), [[0, 1, 2]])
+    with pytest.raises(surfel.InvalidArray, match="triangles: found 3 masked values"):
+        surfel.Mesh(points, masked(numpy.array([[0, 1, 2], [3, 4, 5]]), slice(0, 1)))
