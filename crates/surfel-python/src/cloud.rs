@@ -20,7 +20,16 @@ use surfel_core::scene::Mesh;
 use surfel_core::words::counted;
 use surfel_formats::SaveOptions;
 
-/// A point cloud: positions and the columns beside them. It does not change; threads may share it.
+/// A point cloud: positions and the columns beside them, of arrays, or of a cloud of laspy, Open3D, PyVista, trimesh, pandas
+/// or xarray. It does not change; threads may share it.
+///
+/// `points`: (N, 3), any numbers; rows that are not finite, or masked, count as not measured. `normals`: (N, 3), any length.
+/// `radii`: (N,) or a number, in the unit of the positions. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0
+/// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,). `crs`: the coordinate
+/// system, as `EPSG:25832`, 25832, WKT, or one of pyproj.
+///
+/// Positions are copied once, to float32 about `origin`, which keeps the resolution of georeferenced coordinates.
+/// Later changes of the arrays change nothing here. Raises `InvalidArray`, and `InvalidSetting` for an unknown `crs`.
 #[pyclass(frozen, module = "surfel", name = "Cloud")]
 pub struct PyCloud {
     /// The columns.
@@ -54,15 +63,6 @@ impl PyCloud {
 
 #[pymethods]
 impl PyCloud {
-    /// Makes a cloud of arrays, or of a cloud of laspy, Open3D, PyVista, trimesh, pandas or xarray.
-    ///
-    /// `points`: (N, 3), any numbers; rows that are not finite count as not measured. `normals`: (N, 3), any length.
-    /// `radii`: (N,) or a number, in the unit of the positions. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0
-    /// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,). `crs`: the coordinate
-    /// system, as `EPSG:25832`, 25832, WKT, or one of pyproj.
-    ///
-    /// Positions are copied once, to float32 about `origin`, which keeps the resolution of georeferenced coordinates.
-    /// Later changes of the arrays change nothing here. Raises `InvalidArray`, and `InvalidSetting` for an unknown `crs`.
     #[new]
     #[pyo3(signature = (
         points, *, normals = None, radii = None, colors = None, intensity = None, classification = None, scalars = None,
@@ -309,7 +309,13 @@ fn values_of(array: &Bound<'_, PyAny>) -> PyResult<Values> {
     })
 }
 
-/// Triangles over shared vertices. It does not change; threads may share it.
+/// Triangles over shared vertices, of arrays, or of a mesh of Open3D, PyVista or trimesh. It does not change; threads may
+/// share it.
+///
+/// `vertices`: (N, 3), any numbers. `triangles`: (M, 3), indices of vertices, counter-clockwise seen from the front.
+/// `normals`: (N, 3); without them triangles are flat. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0 to 1.
+///
+/// Raises `InvalidArray`.
 #[pyclass(frozen, module = "surfel", name = "Mesh")]
 pub struct PyMesh {
     /// The columns.
@@ -318,12 +324,6 @@ pub struct PyMesh {
 
 #[pymethods]
 impl PyMesh {
-    /// Makes a mesh of arrays, or of a mesh of Open3D, PyVista or trimesh.
-    ///
-    /// `vertices`: (N, 3), any numbers. `triangles`: (M, 3), indices of vertices, counter-clockwise seen from the front.
-    /// `normals`: (N, 3); without them triangles are flat. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0 to 1.
-    ///
-    /// Raises `InvalidArray`.
     #[new]
     #[pyo3(signature = (vertices, triangles = None, *, normals = None, colors = None))]
     fn from_arrays(

@@ -53,7 +53,11 @@ pub fn animate(
     })
 }
 
-/// The frames of a movie of a scene as it is now, one by one and in any order. Keywords are keys of scene files.
+/// The frames of a movie of a scene as it is now, one by one and in any order: pictures of the colour alone. Keywords are
+/// keys of scene files, as `fps`, `frames` and `turntable` (seconds of a turn).
+///
+/// `film[0]` is the first frame, `film[-1]` the last one; `for image in film` renders each. `progress` is called as
+/// `progress(stage, done, total)` while the scene is read.
 ///
 /// Raises `InvalidSetting` if nothing moves and neither `frames` nor `turntable` is given.
 #[pyclass(frozen, module = "surfel", name = "Film")]

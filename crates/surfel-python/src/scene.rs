@@ -28,7 +28,11 @@ use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
 use surfel_core::words::counted;
 
-/// A scene of files and clouds. Threads may share it.
+/// A scene of files, clouds and meshes, which shows nothing yet. Threads may share it.
+///
+/// Keywords are keys of scene files: a dot is an underscore, or a dict. What they leave open is chosen from the data.
+///
+/// Raises `InvalidSetting` for unknown keys and wrong values.
 #[pyclass(frozen, module = "surfel", name = "Scene")]
 pub struct PyScene {
     state: Mutex<State>,
@@ -112,9 +116,6 @@ impl PyScene {
 
 #[pymethods]
 impl PyScene {
-    /// Makes a scene that shows nothing yet. Keywords are keys of scene files.
-    ///
-    /// Raises `InvalidSetting`.
     #[new]
     #[pyo3(signature = (**keys))]
     fn empty(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {

@@ -84,3 +84,16 @@ def test_objects_do_not_change():
     for value in (surfel.Scene(), surfel.Cloud([[0, 0, 0]])):
         with pytest.raises(AttributeError):
             value.color = 1
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (surfel.Cloud, ["(N, 3)", "`crs`", "in the unit of the positions", "Raises `InvalidArray`"]),
+        (surfel.Mesh, ["(M, 3)", "counter-clockwise", "Raises `InvalidArray`"]),
+        (surfel.Scene, ["keys of scene files", "Raises `InvalidSetting`"]),
+        (surfel.Film, ["`turntable`", "Raises `InvalidSetting`"]),
+    ],
+)
+def test_help_about_a_class_says_what_it_takes(value, words):
+    assert [word for word in words if word not in value.__doc__] == []
