@@ -176,6 +176,15 @@ def test_open3d_meshes_and_clouds_are_added():
     assert (surfel.Cloud(cloud).colors == COLORS * 257).all()
 
 
+def test_pandas_columns_are_handed_over_as_scalars():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"h": numpy.arange(2500.0), 7: numpy.arange(2500)})
+    cloud = surfel.Cloud(hill_points(), scalars=frame[["h"]])
+    assert (cloud.scalars["h"] == numpy.arange(2500)).all()
+    with pytest.raises(TypeError, match="scalars: found the name 7"):
+        surfel.Cloud(hill_points(), scalars=frame)
+
+
 def test_pyvista_grids_are_refused_with_what_makes_a_mesh():
     pyvista = pytest.importorskip("pyvista")
     grid = pyvista.ImageData(dimensions=(3, 3, 3))

@@ -44,6 +44,20 @@ def scalars(name, values, n_points):
     return _contiguous(name, array.astype(code) if code else array, ("u1", "u2", "i4", "f4", "f8"))
 
 
+def named_columns(columns):
+    """Columns by their names, as a dict: of any mapping, or of a table.
+
+    Raises `TypeError` for anything else.
+    """
+    if not hasattr(columns, "keys"):
+        raise TypeError(f"scalars: found {_kind(columns)}, expected names with columns, as {{'age': age}}")
+    named = dict(columns)
+    for name in named:
+        if not isinstance(name, str):
+            raise TypeError(f"scalars: found the name {name!r}, expected text, as in {{'age': age}}")
+    return named
+
+
 def classes(values, n_points):
     """ASPRS classes from 0 to 255."""
     import numpy
