@@ -108,14 +108,28 @@ prepare_browser() {
     mv -T "$fresh" "$PLAYWRIGHT" 2>/dev/null || { rm -rf "$PLAYWRIGHT" && mv "$fresh" "$PLAYWRIGHT"; }
 }
 
+# Prints the interpreters that the package works with, the newest first: of each version one that runs. Those of pyenv are
+# asked themselves, since its commands fail for versions that are not chosen.
+python_interpreters() {
+    local python
+    for python in python3 python3.{10..19} "${PYENV_ROOT:-${HOME:-/tmp}/.pyenv}"/versions/*/bin/python3; do
+        "$python" - 2>/dev/null <<'END'
+import sys
+import sysconfig
+
+is_ready = sys.version_info.releaselevel == "final" and not sysconfig.get_config_var("Py_GIL_DISABLED")
+if is_ready and sys.version_info >= (3, 10):
+    print("%d.%d" % sys.version_info[:2], sys.executable)
+END
+    done | sort -V -r -k 1,1 -s | awk '!seen[$1]++' | cut -d ' ' -f 2-
+}
+
 # Builds the wheel, installs it into a fresh environment of the newest Python and into one of the oldest, and runs
 # pytest there. Prints why and counts one skipped check where there is no Python, or no package registry.
 python_tests() {
     begin "Python"
-    local found=() python environment wheel
-    for python in python3.15 python3.14 python3.13 python3.12 python3.11 python3.10 python3; do
-        "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && found+=("$python")
-    done
+    local found=() environment wheel oldest=3.10
+    mapfile -t found < <(python_interpreters)
     [ ${#found[@]} -gt 0 ] || { skip "tests of the Python package: Python 3.10 or newer is not installed"; return; }
     environment=$(mktemp -d)
     if ! "${found[0]}" -m venv "$environment/build" || ! "$environment/build/bin/pip" install -q maturin >"$log" 2>&1; then
@@ -128,8 +142,10 @@ python_tests() {
         # What surfel works with but does not need; tests that need one that is missing are skipped. Notebooks run once.
         # Open3D takes a gigabyte and needs system libraries, so its tests are run by hand.
         local others=(laspy pandas trimesh pyproj xarray pyvista "dask distributed")
-        pytest_in "$environment/newest" "${found[0]}" "$wheel" "${others[@]}" "jupyterlab ipykernel nbclient nbformat anywidget"
+        pytest_in "$environment/newest" "${found[0]}" "$wheel" "${others[@]}" mypy "jupyterlab ipykernel nbclient nbformat anywidget"
         [ "${found[0]}" = "${found[-1]}" ] || pytest_in "$environment/oldest" "${found[-1]}" "$wheel" "${others[@]}"
+        "${found[-1]}" -c "import sys; sys.exit('%d.%d' % sys.version_info[:2] != '$oldest')" ||
+            skip "tests of the Python package on Python $oldest, the oldest that it works with: it is not installed"
     fi
     rm -rf "$environment"
 }

@@ -74,6 +74,20 @@ pub fn shared_array<'py, E: Element, O: Any + Send + Sync>(
     py.import("numpy")?.call_method1("asarray", (Bound::new(py, buffer)?,))
 }
 
+/// Returns an array as the protocol `__array__` asks for it: in this type, and copied always, never, or where it must be.
+pub fn as_numpy<'py>(
+    array: Bound<'py, PyAny>,
+    dtype: Option<&Bound<'py, PyAny>>,
+    copy: Option<bool>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = array.py().import("numpy")?;
+    // Versions before 2 know no `copy=None`.
+    let Some(copy) = copy else { return numpy.call_method1("asarray", (array, dtype)) };
+    let keywords = PyDict::new(array.py());
+    keywords.set_item("copy", copy)?;
+    numpy.call_method("array", (array, dtype), Some(&keywords))
+}
+
 /// Makes an array of numbers that belongs to the caller, who may write to it.
 pub fn owned_array<'py, E: numpy::Element>(
     py: Python<'py>,

@@ -1,11 +1,12 @@
 //! Clouds and meshes of arrays.
 
 use crate::array::{checked, column, positions, scaled_positions, singles, vectors};
-use crate::buffer::{Element, owned_array, shared_array};
-use crate::errors::{invalid_array, invalid_setting, to_exception};
+use crate::buffer::{Element, as_numpy, owned_array, shared_array};
+use crate::errors::{invalid_array, invalid_setting, refuse_others, to_exception, unpicklable};
 use crate::height_map::epsg_name;
 use crate::value::to_value;
 use crate::work;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::{Path, PathBuf};
@@ -20,7 +21,16 @@ use surfel_core::scene::Mesh;
 use surfel_core::words::counted;
 use surfel_formats::SaveOptions;
 
-/// A point cloud: positions and the columns beside them. It does not change; threads may share it.
+/// A point cloud: positions and the columns beside them, of arrays, or of a cloud of laspy, Open3D, PyVista, trimesh, pandas
+/// or xarray. It does not change; threads may share it.
+///
+/// `points`: (N, 3), any numbers; rows that are not finite, or masked, count as not measured. `normals`: (N, 3), any length.
+/// `radii`: (N,) or a number, in the unit of the positions. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0
+/// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,). `crs`: the coordinate
+/// system, as `EPSG:25832`, 25832, WKT, or one of pyproj.
+///
+/// Positions are copied once, to float32 about `origin`, which keeps the resolution of georeferenced coordinates.
+/// Later changes of the arrays change nothing here. Raises `InvalidArray`, and `InvalidSetting` for an unknown `crs`.
 #[pyclass(frozen, module = "surfel", name = "Cloud")]
 pub struct PyCloud {
     /// The columns.
@@ -54,20 +64,15 @@ impl PyCloud {
 
 #[pymethods]
 impl PyCloud {
-    /// Makes a cloud of arrays, or of a cloud of laspy, Open3D, PyVista, trimesh, pandas or xarray.
-    ///
-    /// `points`: (N, 3), any numbers; rows that are not finite count as not measured. `normals`: (N, 3), any length.
-    /// `radii`: (N,) or a number, in the unit of the positions. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0
-    /// to 1. `intensity`: (N,). `classification`: (N,), 0 to 255. `scalars`: names with columns (N,). `crs`: the coordinate
-    /// system, as `EPSG:25832`, 25832, WKT, or one of pyproj.
-    ///
-    /// Positions are copied once, to float32 about `origin`, which keeps the resolution of georeferenced coordinates.
-    /// Later changes of the arrays change nothing here. Raises `InvalidArray`, and `InvalidSetting` for an unknown `crs`.
     #[new]
-    #[pyo3(signature = (
-        points, *, normals = None, radii = None, colors = None, intensity = None, classification = None, scalars = None,
-        crs = None
-    ))]
+    #[pyo3(
+        signature = (
+            points, *, normals = None, radii = None, colors = None, intensity = None, classification = None,
+            scalars = None, crs = None, **others
+        ),
+        text_signature = "(points, *, normals=None, radii=None, colors=None, intensity=None, classification=None, \
+                          scalars=None, crs=None)"
+    )]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn from_arrays(
         py: Python<'_>,
@@ -77,9 +82,13 @@ impl PyCloud {
         colors: Option<&Bound<'_, PyAny>>,
         intensity: Option<&Bound<'_, PyAny>>,
         classification: Option<&Bound<'_, PyAny>>,
-        scalars: Option<&Bound<'_, PyDict>>,
+        scalars: Option<&Bound<'_, PyAny>>,
         crs: Option<&Bound<'_, PyAny>>,
+        others: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        const KEYWORDS: [&str; 7] =
+            ["normals", "radii", "colors", "intensity", "classification", "scalars", "crs"];
+        refuse_others("Cloud", others, &KEYWORDS)?;
         let found = py.import("surfel._convert")?.call_method1("cloud_columns", (points,))?;
         let columns = match found.is_none() {
             true => PyDict::new(py),
@@ -99,8 +108,9 @@ impl PyCloud {
             values.map_or(Ok(()), |values| columns.set_item(name, values))?;
         }
         let all = PyDict::new(py);
-        for one in [columns.get_item("scalars")?.as_ref(), scalars.map(|dict| &**dict)] {
-            one.map_or(Ok(()), |one| all.update(one.cast()?))?;
+        for named in [columns.get_item("scalars")?.as_ref(), scalars].into_iter().flatten() {
+            let named = checked(py, "named_columns", (named,))?;
+            all.update(named.cast()?)?;
         }
         let coordinate_system = match crs {
             Some(crs) => Some(coordinate_system(crs)?),
@@ -112,6 +122,25 @@ impl PyCloud {
 
     fn __len__(&self) -> usize {
         self.cloud.len()
+    }
+
+    /// The array `points`, for numpy.
+    #[pyo3(signature = (dtype = None, copy = None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if copy == Some(false) {
+            let message = "the points of a cloud are copied; `local_points` and `origin` are not";
+            return Err(PyValueError::new_err(message));
+        }
+        as_numpy(self.points(py)?, dtype, None)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(unpicklable("Cloud"))
     }
 
     /// World coordinates of the points: float64, (N, 3), a copy.
@@ -309,7 +338,13 @@ fn values_of(array: &Bound<'_, PyAny>) -> PyResult<Values> {
     })
 }
 
-/// Triangles over shared vertices. It does not change; threads may share it.
+/// Triangles over shared vertices, of arrays, or of a mesh of Open3D, PyVista or trimesh. It does not change; threads may
+/// share it.
+///
+/// `vertices`: (N, 3), any numbers. `triangles`: (M, 3), indices of vertices, counter-clockwise seen from the front.
+/// `normals`: (N, 3); without them triangles are flat. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0 to 1.
+///
+/// Raises `InvalidArray`.
 #[pyclass(frozen, module = "surfel", name = "Mesh")]
 pub struct PyMesh {
     /// The columns.
@@ -318,21 +353,20 @@ pub struct PyMesh {
 
 #[pymethods]
 impl PyMesh {
-    /// Makes a mesh of arrays, or of a mesh of Open3D, PyVista or trimesh.
-    ///
-    /// `vertices`: (N, 3), any numbers. `triangles`: (M, 3), indices of vertices, counter-clockwise seen from the front.
-    /// `normals`: (N, 3); without them triangles are flat. `colors`: (N, 3) or (N, 4), sRGB as uint8, uint16 or from 0 to 1.
-    ///
-    /// Raises `InvalidArray`.
     #[new]
-    #[pyo3(signature = (vertices, triangles = None, *, normals = None, colors = None))]
+    #[pyo3(
+        signature = (vertices, triangles = None, *, normals = None, colors = None, **others),
+        text_signature = "(vertices, triangles=None, *, normals=None, colors=None)"
+    )]
     fn from_arrays(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         triangles: Option<&Bound<'_, PyAny>>,
         normals: Option<&Bound<'_, PyAny>>,
         colors: Option<&Bound<'_, PyAny>>,
+        others: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        refuse_others("Mesh", others, &["triangles", "normals", "colors"])?;
         let columns = match triangles {
             Some(_) => PyDict::new(py),
             None => mesh_columns(py, vertices)?.ok_or_else(|| {
@@ -383,6 +417,10 @@ impl PyMesh {
         let rgb = |color: &Vec4| color.truncate().to_array().map(encoded);
         let rows = work::detached(py, || colors.iter().flat_map(rgb).collect::<Vec<u16>>())?;
         owned_array(py, rows, vec![colors.len(), 3]).map(Some)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(unpicklable("Mesh"))
     }
 
     fn __repr__(&self) -> String {

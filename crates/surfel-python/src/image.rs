@@ -1,7 +1,7 @@
 //! Pictures: their layers as arrays, and the files that they are saved to.
 
-use crate::buffer::{Element, shared_array};
-use crate::errors::to_exception;
+use crate::buffer::{Element, as_numpy, shared_array};
+use crate::errors::{to_exception, unpicklable};
 use crate::work;
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
@@ -45,7 +45,7 @@ impl PyImage {
         Self { shared: Arc::new(Shared { image, origin, ids, choices, positions, srgb }) }
     }
 
-    fn shape(&self, n_channels: Option<usize>) -> Vec<usize> {
+    fn shape_of(&self, n_channels: Option<usize>) -> Vec<usize> {
         let Image { width, height, .. } = *self.shared.image;
         [height as usize, width as usize].into_iter().chain(n_channels).collect()
     }
@@ -56,7 +56,7 @@ impl PyImage {
         n_channels: Option<usize>,
         layer: impl FnOnce(&Aovs) -> &[E],
     ) -> PyResult<Bound<'py, PyAny>> {
-        shared_array(py, &self.shared, layer(self.aovs()?), self.shape(n_channels))
+        shared_array(py, &self.shared, layer(self.aovs()?), self.shape_of(n_channels))
     }
 
     fn aovs(&self) -> PyResult<&Aovs> {
@@ -67,6 +67,27 @@ impl PyImage {
 
 #[pymethods]
 impl PyImage {
+    /// Height, width and number of channels of `color`, which numpy takes the picture for.
+    #[getter]
+    fn shape(&self) -> (u32, u32, u32) {
+        (self.height(), self.width(), 4)
+    }
+
+    /// The array `color`, for numpy.
+    #[pyo3(signature = (dtype = None, copy = None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        as_numpy(self.color(py)?, dtype, copy)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(unpicklable("Image"))
+    }
+
     /// Width in pixels.
     #[getter]
     fn width(&self) -> u32 {
@@ -83,7 +104,7 @@ impl PyImage {
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let numbers = self.shared.image.color.as_flattened();
-        shared_array(py, &self.shared, numbers, self.shape(Some(4)))
+        shared_array(py, &self.shared, numbers, self.shape_of(Some(4)))
     }
 
     /// Colour for display as in a PNG, not premultiplied, and alpha: uint8, (height, width, 4).
@@ -91,13 +112,13 @@ impl PyImage {
     fn srgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let Shared { image, srgb, .. } = &*self.shared;
         let numbers = work::detached(py, || srgb.get_or_init(|| encoded(image)))?;
-        shared_array(py, &self.shared, numbers, self.shape(Some(4)))
+        shared_array(py, &self.shared, numbers, self.shape_of(Some(4)))
     }
 
     /// Fraction of each pixel's samples that hit a surface: float32, (height, width).
     #[getter]
     fn coverage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        shared_array(py, &self.shared, &self.shared.image.coverage, self.shape(None))
+        shared_array(py, &self.shared, &self.shared.image.coverage, self.shape_of(None))
     }
 
     /// Depth along the view axis in the scene's unit, from the camera of a panorama the distance; `inf` where nothing was
@@ -120,7 +141,7 @@ impl PyImage {
         let Shared { positions, origin, .. } = &*self.shared;
         let world = || positions.get_or_init(|| world_positions(aovs, *origin));
         let numbers = work::detached(py, world)?;
-        shared_array(py, &self.shared, numbers, self.shape(Some(3)))
+        shared_array(py, &self.shared, numbers, self.shape_of(Some(3)))
     }
 
     /// The point that is nearest to what each pixel shows, by its index in the file or array that the scene has it from; of
@@ -128,7 +149,7 @@ impl PyImage {
     #[getter]
     fn point_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.aovs()?;
-        shared_array(py, &self.shared, &self.shared.ids.points, self.shape(None))
+        shared_array(py, &self.shared, &self.shared.ids.points, self.shape_of(None))
     }
 
     /// The number of what each pixel shows, as `Scene.add` returned it and `Scene.cast_rays` has it; 0xFFFFFFFF where nothing
@@ -136,7 +157,7 @@ impl PyImage {
     #[getter]
     fn geometry_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.aovs()?;
-        shared_array(py, &self.shared, &self.shared.ids.geometries, self.shape(None))
+        shared_array(py, &self.shared, &self.shared.ids.geometries, self.shape_of(None))
     }
 
     /// The instance that each pixel shows, in the numbering of .exr files, in which each part of an object is one and hidden

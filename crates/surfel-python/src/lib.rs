@@ -4,6 +4,7 @@
 
 mod errors;
 mod value;
+mod paths;
 mod work;
 mod buffer;
 mod image;

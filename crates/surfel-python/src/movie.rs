@@ -2,7 +2,7 @@
 
 use crate::errors::{invalid_setting, to_exception};
 use crate::image::{PixelIds, PyImage};
-use crate::scene::PyScene;
+use crate::scene::{PyScene, check_is_not_empty};
 use crate::threads::{on_threads, own_threads};
 use crate::value::with_keys;
 use crate::work;
@@ -40,6 +40,7 @@ pub fn animate(
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<()> {
     let mut description = with_keys(py, &scene.get().description(), keys)?;
+    check_is_not_empty(py, &description)?;
     if let Some(frames) = frames {
         description.output.frames = Some(n_frames(frames)?);
     }
@@ -53,7 +54,11 @@ pub fn animate(
     })
 }
 
-/// The frames of a movie of a scene as it is now, one by one and in any order. Keywords are keys of scene files.
+/// The frames of a movie of a scene as it is now, one by one and in any order: pictures of the colour alone. Keywords are
+/// keys of scene files, as `fps`, `frames` and `turntable` (seconds of a turn).
+///
+/// `film[0]` is the first frame, `film[-1]` the last one; `for image in film` renders each. `progress` is called as
+/// `progress(stage, done, total)` while the scene is read.
 ///
 /// Raises `InvalidSetting` if nothing moves and neither `frames` nor `turntable` is given.
 #[pyclass(frozen, module = "surfel", name = "Film")]
@@ -77,6 +82,7 @@ impl PyFilm {
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let description = with_keys(py, &scene.get().description(), keys)?;
+        check_is_not_empty(py, &description)?;
         work::run(py, progress, |progress| {
             let threads = own_threads(&description.run)?;
             let log = ProgressLog::new(progress);
@@ -99,11 +105,46 @@ impl PyFilm {
         self.memory_estimate
     }
 
+    /// Renders a frame, from the end where `index` is negative.
+    fn __getitem__(&self, py: Python<'_>, index: i64) -> PyResult<PyImage> {
+        let from_end = if index < 0 { i64::from(self.n_frames) } else { 0 };
+        let index = u32::try_from(index + from_end).unwrap_or(u32::MAX);
+        self.rendered(py, index, None)
+    }
+
+    /// Renders one frame after the other.
+    fn __iter__<'py>(film: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let builtins = film.py().import("builtins")?;
+        let indices = builtins.call_method1("range", (film.get().n_frames,))?;
+        builtins.call_method1("map", (film.getattr("render")?, indices))
+    }
+
     /// Renders a frame, counted from 0: the picture that `animate` would write, without layers but the colour.
     ///
-    /// Raises `IndexError` beyond the last one.
+    /// Raises `IndexError` beyond the last one, `InvalidSetting` for negative numbers.
     #[pyo3(signature = (index, *, progress = None))]
     fn render(
+        &self,
+        py: Python<'_>,
+        index: i64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyImage> {
+        if index < 0 {
+            let message = format!("found {index}, expected 0 to {}", self.n_frames - 1);
+            return Err(invalid_setting(py, Invalid::at("index", message)));
+        }
+        self.rendered(py, u32::try_from(index).unwrap_or(u32::MAX), progress)
+    }
+
+    /// Renders a frame to a file as `animate` would write it, of .exr with all layers.
+    fn _save(&self, py: Python<'_>, index: u32, path: PathBuf) -> PyResult<()> {
+        self.check(index)?;
+        work::run(py, None, |progress| self.frame(index, progress)?.0.save(path))
+    }
+}
+
+impl PyFilm {
+    fn rendered(
         &self,
         py: Python<'_>,
         index: u32,
@@ -118,19 +159,11 @@ impl PyFilm {
         })
     }
 
-    /// Renders a frame to a file as `animate` would write it, of .exr with all layers.
-    fn _save(&self, py: Python<'_>, index: u32, path: PathBuf) -> PyResult<()> {
-        self.check(index)?;
-        work::run(py, None, |progress| self.frame(index, progress)?.0.save(path))
-    }
-}
-
-impl PyFilm {
     fn check(&self, index: u32) -> PyResult<()> {
         if index < self.n_frames {
             return Ok(());
         }
-        let message = format!("frame {index} of {}", self.n_frames);
+        let message = format!("frame {index}: expected 0 to {}", self.n_frames - 1);
         Err(PyIndexError::new_err(message))
     }
 

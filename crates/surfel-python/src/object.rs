@@ -2,11 +2,12 @@
 
 use crate::cloud::{PyCloud, PyMesh, mesh_columns, to_cloud};
 use crate::errors::{invalid_array, invalid_setting, to_exception};
+use crate::paths::file_name;
 use crate::value::{table, to_value};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 use surfel::memory_files::MemoryContent;
@@ -38,7 +39,7 @@ impl NewObject {
         if let Some(transform) = transform {
             table.insert("matrix".into(), matrix(transform)?);
         }
-        if let Ok(path) = what.extract::<PathBuf>() {
+        if let Some(path) = file_name(what)? {
             table.insert("file".into(), json!(path.display().to_string()));
             return Ok(Self { content: None, table });
         }
@@ -52,11 +53,21 @@ impl NewObject {
         description: &SceneDescription,
     ) -> PyResult<SceneDescription> {
         let mut description = description.clone();
+        let is_taken = |name: &str| {
+            description.objects.iter().any(|object| object.name.as_deref() == Some(name))
+        };
+        if let Some(name) = self.table.get("name").and_then(Value::as_str)
+            && is_taken(name)
+        {
+            let message = format!("another object is `{name}` already; choose another name");
+            return Err(invalid_setting(py, Invalid::at("name", message)));
+        }
         if let Some(content) = self.content {
-            let number = description.objects.len();
-            let name =
-                self.table.entry("name").or_insert_with(|| json!(format!("object {number}")));
-            let own = format!("memory:{number}:{}", name.as_str().unwrap_or_default());
+            let mut names = (description.objects.len()..).map(|i| format!("object {i}"));
+            let free = names.find(|name| !is_taken(name)).unwrap_or_default();
+            let name = self.table.entry("name").or_insert_with(|| json!(free));
+            // Messages say it as they say names of files.
+            let own = format!("<{}>", name.as_str().unwrap_or_default());
             let known = description.memory.name_of(&content).map(|name| name.display().to_string());
             let file = known.unwrap_or(own);
             description.memory.insert(&file, content);

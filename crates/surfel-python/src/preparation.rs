@@ -2,12 +2,12 @@
 
 use crate::cloud::{PyCloud, to_cloud};
 use crate::errors::invalid_setting;
+use crate::paths::{file_name, file_names};
 use crate::threads::{on_threads, own_threads};
 use crate::value::with_keys;
 use crate::work;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use std::path::PathBuf;
+use pyo3::types::{PyDict, PyTuple};
 use surfel::SceneDescription;
 use surfel::description::{Invalid, KeyedSettings, Part, Section};
 use surfel::prepare::{PointSource, PrepareOptions, prepare_points, read_points};
@@ -16,16 +16,16 @@ use surfel_formats::{FileInfo, Loaded, SaveOptions};
 
 /// Reads the points of a file, or of several that become one cloud, with all columns: of a mesh its vertices.
 ///
-/// Keywords are the keys of reading in scene files: `filter`, `class`, `returns`, `crop`, `columns`, `salvage` and `reproject`,
+/// Keywords are the keys of reading in scene files: `filter`, `class_`, `returns`, `crop`, `columns`, `salvage` and `reproject`,
 /// besides `threads` and `memory_limit`. Coordinates in degrees of longitude and latitude stay, with a warning, unless
 /// `reproject=True` moves them to metres. `progress` is called as `progress(stage, done, total)`.
 ///
-/// Raises `MissingFile`, `InvalidFile`, `InvalidSetting`, `InvalidScene` if no point is kept, `OutOfMemory`.
+/// Raises `MissingFile`, `InvalidFile`, also for URLs, `InvalidSetting`, `InvalidScene` if no point is kept, `OutOfMemory`.
 #[pyfunction]
 #[pyo3(signature = (*paths, progress = None, **keys))]
 pub fn read_cloud(
     py: Python<'_>,
-    paths: Vec<PathBuf>,
+    paths: &Bound<'_, PyTuple>,
     progress: Option<&Bound<'_, PyAny>>,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyCloud> {
@@ -43,6 +43,7 @@ pub fn read_cloud(
     let description = with_keys(py, &SceneDescription::default(), keys)?;
     check_keys(&description, |_, name| KEYS.contains(&name), "reading; give it to prepare or load")
         .map_err(|error| invalid_setting(py, error))?;
+    let paths = file_names("surfel.read_cloud", paths)?;
     let sources = paths.into_iter().map(PointSource::File).collect();
     made(py, progress, &description, |progress| read_points(sources, &description, progress))
 }
@@ -96,7 +97,7 @@ fn made(
 
 /// Returns the points of a file, of a cloud, or of what becomes a cloud.
 fn source(source: &Bound<'_, PyAny>) -> PyResult<PointSource> {
-    if let Ok(path) = source.extract::<PathBuf>() {
+    if let Some(path) = file_name(source)? {
         return Ok(PointSource::File(path));
     }
     let cloud = to_cloud(source)?;

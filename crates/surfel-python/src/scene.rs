@@ -2,18 +2,19 @@
 
 use crate::array::{checked, column};
 use crate::buffer::owned_array;
-use crate::errors::{invalid_setting, to_exception};
+use crate::errors::{invalid_setting, to_exception, unpicklable};
 use crate::height_map::PyHeightMap;
 use crate::image::{PixelIds, PyImage};
 use crate::object::NewObject;
 use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
+use crate::paths::file_names;
 use crate::rays::{RayArray, ViewRays, ray_hits};
 use crate::value::{to_python, with_keys};
 use crate::work;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::description::{Invalid, is_scene_file};
 use surfel::live_scene::LiveScene;
@@ -28,7 +29,11 @@ use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
 use surfel_core::words::counted;
 
-/// A scene of files and clouds. Threads may share it.
+/// A scene of files, clouds and meshes, which shows nothing yet. Threads may share it.
+///
+/// Keywords are keys of scene files: a dot is an underscore, or a dict. What they leave open is chosen from the data.
+///
+/// Raises `InvalidSetting` for unknown keys and wrong values.
 #[pyclass(frozen, module = "surfel", name = "Scene")]
 pub struct PyScene {
     state: Mutex<State>,
@@ -79,6 +84,7 @@ impl PyScene {
     ) -> PyResult<(Arc<OpenScene>, Arc<ChosenView>)> {
         let (startup, slot) = self.state();
         let description = with_keys(py, &startup, keys)?;
+        check_is_not_empty(py, &description)?;
         work::run(py, progress, |progress| {
             let scene = match is_read_alike(&startup, &description) {
                 true => opened(&slot, &startup, progress)?,
@@ -112,9 +118,6 @@ impl PyScene {
 
 #[pymethods]
 impl PyScene {
-    /// Makes a scene that shows nothing yet. Keywords are keys of scene files.
-    ///
-    /// Raises `InvalidSetting`.
     #[new]
     #[pyo3(signature = (**keys))]
     fn empty(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -346,9 +349,14 @@ impl PyScene {
     /// Returns about how many bytes the scene takes once it is prepared. Reads its files.
     fn _memory_estimate(&self, py: Python<'_>) -> PyResult<u64> {
         let (description, slot) = self.state();
+        check_is_not_empty(py, &description)?;
         work::run(py, None, |progress| {
             Ok(opened(&slot, &description, progress)?.scene.memory_estimate())
         })
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(unpicklable("Scene"))
     }
 
     fn __repr__(&self) -> String {
@@ -356,6 +364,15 @@ impl PyScene {
         let files = counted(description.files.len(), "file");
         format!("<surfel.Scene of {files} and {}>", counted(description.objects.len(), "object"))
     }
+}
+
+/// Checks that there is something to show.
+pub fn check_is_not_empty(py: Python<'_>, description: &SceneDescription) -> PyResult<()> {
+    description.check_is_not_empty().map_err(|_| {
+        let message =
+            "the scene has no objects: add a Cloud, a Mesh or a file with scene.add, or load files";
+        invalid_setting(py, Invalid::new(message))
+    })
 }
 
 /// Refuses the keys of files that the program writes.
@@ -413,17 +430,18 @@ fn scene_of_text(py: Python<'_>, text: &str) -> PyResult<SceneDescription> {
 /// Keywords are keys of scene files: a dot is an underscore, or a dict: `camera_position=(1, 2, 3)` or
 /// `camera={"position": (1, 2, 3)}`. What they leave open is chosen from the data.
 ///
-/// Raises `MissingFile`, `InvalidFile`, `InvalidSetting`.
+/// Raises `MissingFile`, `InvalidFile`, also for URLs, `InvalidSetting`.
 #[pyfunction]
 #[pyo3(signature = (*paths, progress = None, **keys))]
 pub fn load(
     py: Python<'_>,
-    paths: Vec<PathBuf>,
+    paths: &Bound<'_, PyTuple>,
     progress: Option<&Bound<'_, PyAny>>,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyScene> {
     let scene = _unread(py, paths, None, keys)?;
     let (description, slot) = scene.state();
+    check_is_not_empty(py, &description)?;
     work::run(py, progress, |progress| opened(&slot, &description, progress).map(drop))?;
     Ok(scene)
 }
@@ -434,12 +452,12 @@ pub fn load(
 #[pyo3(signature = (*paths, _scene = None, **keys))]
 pub fn _unread(
     py: Python<'_>,
-    paths: Vec<PathBuf>,
+    paths: &Bound<'_, PyTuple>,
     _scene: Option<&str>,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyScene> {
     let mut description = scene_of_text(py, _scene.unwrap_or("{}"))?;
-    for path in paths {
+    for path in file_names("surfel.load", paths)? {
         if is_scene_file(&path) {
             let read = SceneDescription::read(&path).map_err(|error| to_exception(py, &error))?;
             description.overlay(read);

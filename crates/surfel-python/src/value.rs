@@ -3,19 +3,22 @@
 use crate::errors::invalid_setting;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
 use serde_json::{Map, Number, Value, json};
 use std::path::{Path, absolute};
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 
-/// Reads keywords as a table of keys.
+/// Reads keywords as a table of keys. One that is a word of the language, as `class`, has an underscore at its end.
 pub fn table(keys: Option<&Bound<'_, PyDict>>) -> PyResult<Map<String, Value>> {
     let mut table = Map::new();
     for (key, value) in keys.into_iter().flatten() {
-        let key: String = key.extract()?;
-        let value = to_value(&key, &value)?;
-        table.insert(key, value);
+        let name: String = key.extract()?;
+        let key = name.strip_suffix('_').unwrap_or(&name);
+        if table.insert(key.to_owned(), to_value(key, &value)?).is_some() {
+            let message = format!("is given twice, also as {key}_");
+            return Err(invalid_setting(value.py(), Invalid::at(key, message)));
+        }
     }
     Ok(table)
 }
@@ -27,17 +30,28 @@ pub fn with_keys(
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SceneDescription> {
     let mut description = description.clone();
-    let (unset, set) = table(keys)?.into_iter().partition(|(_, value)| value.is_null());
-    let mut layer = SceneDescription::default();
-    let merged = layer.merge(&set).and_then(|()| description.merge(&unset));
-    merged.map_err(|error| invalid_setting(py, error))?;
+    let layer = layer(py, table(keys)?, &mut description)?;
     description.overlay(layer);
     description.check().map_err(|error| invalid_setting(py, error))?;
     Ok(description)
 }
 
+/// Reads keys as a description of its own; those that are `None` become automatic in `below`.
+fn layer(
+    py: Python<'_>,
+    keys: Map<String, Value>,
+    below: &mut SceneDescription,
+) -> PyResult<SceneDescription> {
+    let (unset, set) = keys.into_iter().partition(|(_, value)| value.is_null());
+    let mut layer = SceneDescription::default();
+    let merged = layer.merge(&set).and_then(|()| below.merge(&unset));
+    merged.map_err(|error| invalid_setting(py, error))?;
+    Ok(layer)
+}
+
 /// Returns keywords as a dict of plain values, with files named from the root: it means the same in another process.
-/// Unknown keys and wrong values stay as they are.
+///
+/// Raises `InvalidSetting` for unknown keys and wrong values.
 #[pyfunction]
 #[pyo3(signature = (**keys))]
 pub fn _plain<'py>(
@@ -45,6 +59,10 @@ pub fn _plain<'py>(
     keys: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut table = table(keys)?;
+    let mut settings = table.clone();
+    // The text of a scene file is no key.
+    settings.remove("_scene");
+    layer(py, settings, &mut SceneDescription::default())?;
     table.iter_mut().for_each(|(key, value)| name_from_root(key, value));
     to_python(py, &Value::Object(table))
 }
@@ -96,6 +114,11 @@ pub fn to_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
         if value.hasattr(method)? {
             return to_value(key, &value.call_method0(method)?);
         }
+    }
+    if let Ok(mapping) = value.cast::<PyMapping>() {
+        let dict = PyDict::new(value.py());
+        dict.update(mapping)?;
+        return to_value(key, &dict);
     }
     let items = value.try_iter().map_err(|error| within(key, value, error))?;
     let items = items.enumerate().map(|(i, item)| to_value(&format!("{key}[{i}]"), &item?));

@@ -1,13 +1,19 @@
 //! The viewer, on a thread beside the interpreter.
 
-use crate::errors::{exception, invalid_setting};
-use crate::scene::PyScene;
+use crate::errors::{exception, invalid_setting, refuse_others};
+use crate::scene::{PyScene, check_is_not_empty};
 use crate::work;
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
 use surfel::description::Invalid;
 use surfel_cli::{FrameAncestors, RunningViewer};
+
+/// Time between two looks for Ctrl-C.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A running viewer. It stops with `close()`, at the end of a `with` block, or with the interpreter.
 #[pyclass(frozen, module = "surfel", name = "Viewer")]
@@ -30,6 +36,25 @@ impl PyViewer {
         let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();
         let ended = py.detach(|| running.map_or(Ok(()), RunningViewer::stop));
         ended.map_err(|error| exception(py, "InvalidScene", &error.to_string()))
+    }
+
+    /// Waits until the viewer ends: by Ctrl-C, which stops it, or by `close()` of another thread. A script whose last line this
+    /// is shows the scene until then.
+    ///
+    /// Raises `InvalidScene` if its files could not be read.
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        let is_running = || {
+            let running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+            running.as_ref().is_some_and(|running| !running.is_finished())
+        };
+        while is_running() {
+            match py.check_signals() {
+                Err(raised) if raised.is_instance_of::<PyKeyboardInterrupt>(py) => break,
+                checked => checked?,
+            }
+            py.detach(|| thread::sleep(POLL_INTERVAL));
+        }
+        self.close(py)
     }
 
     fn __enter__(viewer: Py<Self>) -> Py<Self> {
@@ -69,22 +94,32 @@ impl PyViewer {
     }
 }
 
-/// Starts the viewer of a scene as it is now, on this machine alone, and returns at once.
+/// Starts the viewer of a scene as it is now, on this machine alone, and returns at once; `wait()` of the result keeps a
+/// script from ending. Other users of this machine can open the page, too.
 ///
-/// `port` 0 takes any free one. `open=True` opens the page in a browser. In a notebook the result shows the page where anywidget is installed, else
-/// a link to it.
+/// `port`: 0 to 65535; 0 takes any free one. `open=True` opens the page in a browser. In a notebook the result shows the page
+/// where anywidget is installed, else a link to it.
 ///
-/// Raises `Error` if the system refuses the port.
+/// Raises `InvalidSetting` for other ports, `Error` if the system refuses the port.
 #[pyfunction]
-#[pyo3(signature = (scene, *, port = 0, open = false))]
+#[pyo3(
+    signature = (scene, *, port = 0, open = false, **others),
+    text_signature = "(scene, *, port=0, open=False)"
+)]
 pub fn view(
     py: Python<'_>,
     scene: &Bound<'_, PyScene>,
-    port: u16,
+    port: i64,
     open: bool,
+    others: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyViewer> {
+    refuse_others("view", others, &["port", "open"])?;
+    let port = u16::try_from(port).map_err(|_| {
+        let message = format!("found {port}, expected 0 to 65535");
+        invalid_setting(py, Invalid::at("port", message))
+    })?;
     let description = scene.get().description();
-    description.check_is_not_empty().map_err(|error| invalid_setting(py, error))?;
+    check_is_not_empty(py, &description)?;
     let running = work::detached(py, || RunningViewer::start(description, port))?
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
     let (url, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());

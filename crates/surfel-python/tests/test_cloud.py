@@ -1,6 +1,9 @@
 """Clouds and meshes of arrays: what is taken, what is refused, and what becomes of it."""
 
 import array
+import copy
+import pickle
+import types
 
 import numpy
 import pytest
@@ -196,7 +199,7 @@ def test_points_that_are_not_finite_are_left_out(points):
     assert shown.size and numpy.isfinite(points[shown]).all()
     scene = surfel.Scene()
     scene.add(surfel.Cloud(numpy.full((9, 3), numpy.nan)))
-    with pytest.raises(surfel.InvalidScene, match="no points"):
+    with pytest.raises(surfel.InvalidScene, match="^<object 0>: the cloud has no points"):
         scene.render(resolution=(8, 8))
 
 
@@ -303,3 +306,84 @@ def test_buffers_of_the_standard_library_are_arrays():
     flat = array.array("d", range(12))
     cloud = surfel.Cloud(numpy.frombuffer(flat).reshape(4, 3))
     assert cloud.points.tolist() == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]]
+
+
+def masked(points, rows):
+    """The points with -9999 in some rows, which are masked."""
+    values = points.copy()
+    values[rows] = -9999
+    mask = numpy.zeros(values.shape, bool)
+    mask[rows] = True
+    return numpy.ma.array(values, mask=mask)
+
+
+@pytest.mark.parametrize("dtype", ["f8", "f4", "i4"])
+def test_masked_positions_count_as_not_measured(points, dtype):
+    values = masked((points * 1000).astype(dtype), slice(100, 200))
+    cloud = surfel.Cloud(values)
+    assert numpy.isnan(cloud.points[100:200]).all() and numpy.isfinite(cloud.points[200:]).all()
+    assert numpy.allclose(cloud.points[200:], values.data[200:], atol=1e-3)
+    scene = surfel.Scene()
+    scene.add(values)
+    assert -2000 < scene.bounds.min()
+    assert (surfel.Cloud(numpy.ma.array(points)).points == surfel.Cloud(points).points).all()
+
+
+def test_masked_columns_are_missing_or_refused(points):
+    n = len(points)
+    ages = numpy.ma.array(numpy.arange(n), mask=numpy.arange(n) < 7)
+    cloud = surfel.Cloud(points, intensity=ages, scalars={"age": ages, "whole": numpy.ma.array(numpy.arange(n, dtype="i4"))})
+    assert numpy.isnan(cloud.scalars["age"][:7]).all() and (cloud.scalars["age"][7:] == numpy.arange(7, n)).all()
+    assert numpy.isnan(cloud.intensity[:7]).all() and cloud.scalars["whole"].dtype == numpy.int32
+    for keywords, words in [
+        ({"classification": ages % 5}, r"classification: found 7 masked values, expected none; .*classification.filled\(0\)"),
+        ({"colors": masked(points, slice(0, 2)).astype("u1")}, "colors: found 6 masked values"),
+    ]:
+        with pytest.raises(surfel.InvalidArray, match=words):
+            surfel.Cloud(points, **keywords)
+    with pytest.raises(surfel.InvalidArray, match="vertices: found one that is not finite"):
+        surfel.Mesh(masked(points, slice(0, 1)), [[0, 1, 2]])
+    with pytest.raises(surfel.InvalidArray, match="triangles: found 3 masked values"):
+        surfel.Mesh(points, masked(numpy.array([[0, 1, 2], [3, 4, 5]]), slice(0, 1)))
+
+
+def test_scalars_are_any_mapping(points):
+    ages = numpy.arange(len(points), dtype="f4")
+    cloud = surfel.Cloud(points, scalars=types.MappingProxyType({"age": ages}))
+    assert (cloud.scalars["age"] == ages).all()
+    with pytest.raises(TypeError, match="scalars: found an object of type list, expected names with columns"):
+        surfel.Cloud(points, scalars=[ages])
+    with pytest.raises(TypeError, match="scalars: found the name 1, expected text"):
+        surfel.Cloud(points, scalars={1: ages})
+
+
+def test_clouds_are_arrays_of_their_points(points):
+    cloud = surfel.Cloud(points)
+    assert (numpy.asarray(cloud) == cloud.points).all() and numpy.asarray(cloud).dtype == numpy.float64
+    assert numpy.asarray(cloud, dtype="f4").dtype == numpy.float32
+    if numpy.lib.NumpyVersion(numpy.__version__) >= "2.0.0":
+        with pytest.raises(ValueError, match="local_points"):
+            numpy.asarray(cloud, copy=False)
+
+
+def test_clouds_of_clouds_keep_all_columns(points):
+    cloud = surfel.Cloud(points, colors=points * 0 + 0.5, scalars={"age": points[:, 0]}, crs=25832)
+    again = surfel.Cloud(cloud, scalars={"height": points[:, 2]})
+    assert (again.points == cloud.points).all() and (again.colors == cloud.colors).all() and again.crs == "EPSG:25832"
+    assert list(again.scalars) == ["age", "height"] and again.normals is None
+
+
+def test_the_nearest_keyword_is_named(points):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'color'; the nearest known one is `colors`"):
+        surfel.Cloud(points, color=points)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'normal'; the nearest known one is `normals`"):
+        surfel.Mesh(points, [[0, 1, 2]], normal=points)
+
+
+@pytest.mark.parametrize("copied", [pickle.dumps, copy.deepcopy])
+def test_what_stays_in_its_process_says_what_travels(points, copied):
+    scene, cloud = surfel.Scene(resolution=(8, 8), spp=1, light_samples=1), surfel.Cloud(points)
+    scene.add(cloud)
+    for value in (scene, cloud, scene.render(), surfel.Mesh(points, [[0, 1, 2]])):
+        with pytest.raises(TypeError, match=f"surfel.{type(value).__name__} .*cannot be pickled; a surfel.dask.Recipe"):
+            copied(value)

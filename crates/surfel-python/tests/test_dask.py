@@ -18,7 +18,9 @@ from surfel.dask import (  # noqa: E402
     ClusterLost,
     Recipe,
     VersionMismatch,
+    _worker,
     render_frames,
+    render_mosaic,
     render_tiles,
     save_frames,
 )
@@ -84,7 +86,8 @@ def test_recipes_are_equal_if_all_digits_are(hill):
     near, far = (Recipe(hill, camera_position=numpy.array([1.0, 2.0, z])) for z in (3.0, 3.0000000001))
     assert repr(near.keys["camera_position"]) == "[1.0, 2.0, 3.0]" and near != far
     assert near == Recipe(hill, camera_position=(1.0, 2.0, 3.0)) == pickle.loads(pickle.dumps(near))
-    assert Recipe(hill, sun=datetime.datetime(2026, 6, 21, 15)) == Recipe(hill, sun="2026-06-21T15:00:00")
+    date = datetime.datetime(2026, 6, 21, 15, tzinfo=datetime.timezone.utc)
+    assert Recipe(hill, sun=date) == Recipe(hill, sun="2026-06-21T15:00:00+00:00")
     with pytest.raises(surfel.InvalidSetting, match="spp: found an object of type object"):
         Recipe(hill, spp=object())
 
@@ -92,9 +95,9 @@ def test_recipes_are_equal_if_all_digits_are(hill):
 def test_files_of_keywords_are_named_from_the_root(hill, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     keys = {"environment": pathlib.Path("sky.hdr"), "crop": "area.geojson", "color": "rgb", "up": None}
-    recipe = Recipe(hill, sky={"color": "white"}, **keys)
+    recipe = Recipe(hill, camera={"name": "front"}, **keys)
     expected = {"environment": str(tmp_path / "sky.hdr"), "crop": str(tmp_path / "area.geojson"), "color": "rgb", "up": None}
-    assert recipe.keys == expected | {"sky": {"color": "white"}}
+    assert recipe.keys == expected | {"camera": {"name": "front"}}
     assert Recipe(hill, crop="POLYGON((0 0, 1 0, 1 1, 0 0))").keys["crop"].startswith("POLYGON")
 
 
@@ -185,9 +188,14 @@ def test_other_tiles_are_refused(recipe, tiles):
         render_tiles(recipe, tiles)
 
 
+def test_wrong_keywords_are_named_where_the_recipe_is_made(hill):
+    with pytest.raises(surfel.InvalidSetting, match="^turntabel: .*nearest known one is `turntable`"):
+        Recipe(hill, turntabel=1)
+    with pytest.raises(surfel.InvalidSetting, match="^surface: found"):
+        Recipe(hill, surface="velvet")
+
+
 def test_wrong_recipes_are_named_where_they_are_rendered(hill):
-    with pytest.raises(surfel.InvalidSetting, match="nearest known one is `surface`"):
-        render_tiles(Recipe(hill, surfce="smooth")).compute()
     with pytest.raises(surfel.MissingFile):
         dask.compute(*render_frames(Recipe("nowhere.ply", turntable=1), range(2)))
     with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
@@ -207,3 +215,45 @@ def test_films_survive_a_worker(recipe, tmp_path):
             found = client.gather(frames)
     expected = dask.compute(*render_frames(recipe, range(12)))
     assert found == list(expected)
+
+
+def test_formats_are_refused_before_the_work(recipe, tmp_path):
+    for format in _worker.FORMATS:
+        assert len(render_tiles(recipe, 1, format=format).compute(scheduler="sync")) > 100, format
+    for work in (
+        lambda: render_tiles(recipe, format="bmp"),
+        lambda: render_frames(recipe, range(2), format="bmp"),
+        lambda: render_mosaic([recipe], format="bmp"),
+        lambda: save_frames(recipe, range(2), tmp_path / "frame_##.bmp"),
+    ):
+        with pytest.raises(surfel.InvalidSetting, match="^format: found 'bmp', expected one of png, jpg"):
+            work()
+
+
+def test_anything_but_a_recipe_is_refused(hill, tmp_path):
+    for work in (
+        lambda found: render_tiles(found),
+        lambda found: render_frames(found, range(2)),
+        lambda found: render_mosaic([found]),
+        lambda found: save_frames(found, range(2), tmp_path / "frame_##.png"),
+    ):
+        with pytest.raises(TypeError, match="^recipe: found 'a.las', expected a surfel.dask.Recipe"):
+            work("a.las")
+        with pytest.raises(TypeError, match="^recipe: found an object of type Scene, expected"):
+            work(surfel.load(hill))
+
+
+@pytest.mark.parametrize("frames", [4, [0, -1]])
+def test_other_frames_are_refused(recipe, tmp_path, frames):
+    for work in (lambda: render_frames(recipe, frames), lambda: save_frames(recipe, frames, tmp_path / "frame_##.png")):
+        with pytest.raises(ValueError, match=r"^frames: found -?\d, expected indices from 0, as range\(100\)"):
+            work()
+
+
+def test_urls_are_no_files_of_recipes():
+    with pytest.raises(surfel.InvalidFile, match="^https://x.org/a.laz: is a URL"):
+        Recipe("https://x.org/a.laz")
+
+
+def test_exceptions_are_named_as_they_are_imported():
+    assert VersionMismatch.__module__ == ClusterLost.__module__ == "surfel.dask"

@@ -174,3 +174,27 @@ def test_open3d_meshes_and_clouds_are_added():
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(hill_points()))
     cloud.colors = open3d.utility.Vector3dVector(COLORS / 255)
     assert (surfel.Cloud(cloud).colors == COLORS * 257).all()
+
+
+def test_pandas_columns_are_handed_over_as_scalars():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"h": numpy.arange(2500.0), 7: numpy.arange(2500)})
+    cloud = surfel.Cloud(hill_points(), scalars=frame[["h"]])
+    assert (cloud.scalars["h"] == numpy.arange(2500)).all()
+    with pytest.raises(TypeError, match="scalars: found the name 7"):
+        surfel.Cloud(hill_points(), scalars=frame)
+
+
+def test_pyvista_grids_are_refused_with_what_makes_a_mesh():
+    pyvista = pytest.importorskip("pyvista")
+    grid = pyvista.ImageData(dimensions=(3, 3, 3))
+    blocks = pyvista.MultiBlock([pyvista.Sphere()])
+    kinds = [grid, grid.cast_to_structured_grid(), grid.cast_to_unstructured_grid(), blocks]
+    for data in kinds:
+        for take in (surfel.Mesh, surfel.Scene().add):
+            with pytest.raises(surfel.InvalidArray, match=rf"found a {type(data).__name__}.* `.extract_surface\(\)`"):
+                take(data)
+        surfel.Scene().add(data.extract_surface().triangulate())
+    with pytest.raises(surfel.InvalidArray, match="MultiBlock of 1 blocks"):
+        surfel.Cloud(blocks)
+    assert len(surfel.Cloud(kinds[2])) == 27

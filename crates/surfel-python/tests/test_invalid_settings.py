@@ -1,6 +1,7 @@
 """Keywords, values and files that make no sense: an exception each time, with the program's words."""
 
 import datetime
+import re
 import subprocess
 import sys
 
@@ -82,3 +83,36 @@ def test_messages_are_those_of_the_program(hill):
     program = subprocess.run(words, capture_output=True, text=True)
     assert program.returncode == 1
     assert str(caught.value) in program.stderr
+
+
+@pytest.mark.parametrize(
+    ("url", "advice"),
+    [
+        ("https://x.org/a/scan.laz?key=1", r"download it first, as by `urllib.request.urlretrieve\(url, 'scan.laz'\)`"),
+        ("s3://bucket/scan.laz", "fsspec.open_local"),
+        ("file:///data/scan.laz", "leave out `file://`"),
+    ],
+)
+def test_urls_are_refused_by_name(url, advice):
+    for take in (surfel.load, surfel.read_cloud, surfel.prepare, surfel.Scene().add):
+        with pytest.raises(surfel.InvalidFile, match=f"^{re.escape(url)}: is a URL, and surfel reads files.*{advice}"):
+            take(url)
+
+
+def test_what_is_no_name_of_a_file_is_told(hill, points):
+    with pytest.raises(TypeError, match=r"^surfel.load: found a list, .*surfel.load\(\*paths\)"):
+        surfel.load([hill, hill])
+    with pytest.raises(TypeError, match=r"^surfel.load: found an object of type ndarray, .*scene.add\(surfel.Cloud\(array\)\)"):
+        surfel.load(points)
+    with pytest.raises(TypeError, match=r"surfel.read_cloud\(\*paths\)"):
+        surfel.read_cloud((hill, hill))
+
+
+def test_keys_that_are_words_of_the_language_end_with_an_underscore(points, tmp_path):
+    n = len(points)
+    surfel.Cloud(points, classification=numpy.where(numpy.arange(n) < 100, 2, 6)).save(tmp_path / "hill.laz")
+    assert len(surfel.read_cloud(tmp_path / "hill.laz", class_="ground")) == 100
+    scene = surfel.load(tmp_path / "hill.laz", class_=6)
+    assert scene.describe()["class"] == surfel.load(tmp_path / "hill.laz", **{"class": 6}).describe()["class"]
+    with pytest.raises(surfel.InvalidSetting, match="^class: is given twice, also as class_"):
+        surfel.load(tmp_path / "hill.laz", class_=6, **{"class": 6})

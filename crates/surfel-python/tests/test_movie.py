@@ -95,7 +95,20 @@ def test_frames_are_rendered_one_by_one(hill, tmp_path):
     surfel.animate(scene, tmp_path / "f_#.png")
     for index in (3, 0, 4):
         assert film.render(index)._repr_png_() == (tmp_path / f"f_{index + 1}.png").read_bytes()
-    with pytest.raises(IndexError, match="frame 5 of 5"):
+    with pytest.raises(IndexError, match="frame 5: expected 0 to 4"):
         film.render(5)
+    with pytest.raises(ValueError, match="^index: found -1, expected 0 to 4"):
+        film.render(-1)
     with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
         surfel.Film(surfel.load(hill))
+
+
+def test_films_are_sequences_of_pictures(hill):
+    film = surfel.Film(surfel.load(hill, turntable=1, fps=3, **SMALL))
+    pictures = [film.render(i).color for i in range(3)]
+    assert [(image.color == picture).all() for image, picture in zip(film, pictures)] == [True] * 3
+    assert len(list(film)) == 3
+    assert (film[0].color == pictures[0]).all() and (film[-1].color == pictures[2]).all()
+    for index in (3, -4):
+        with pytest.raises(IndexError):
+            film[index]

@@ -192,3 +192,10 @@ def test_a_scene_file_is_a_scene(hill, tmp_path):
 def test_the_description_is_complete(hill):
     keys = surfel.load(hill).describe(resolution=(64, 48))
     assert keys["resolution"] == "64x48" and len(keys["camera"]["position"]) == 3
+
+
+def test_pictures_are_arrays_of_their_colours(image):
+    assert image.shape == (48, 64, 4) == numpy.asarray(image).shape
+    assert numpy.shares_memory(numpy.asarray(image), image.color) and (numpy.asarray(image) == image.color).all()
+    assert numpy.asarray(image, dtype="f8").dtype == numpy.float64
+    assert not numpy.shares_memory(numpy.array(image), image.color)

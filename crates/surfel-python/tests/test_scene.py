@@ -1,5 +1,8 @@
 """Scenes of clouds, meshes and files: places, materials, numbers of what was added."""
 
+import types
+import warnings
+
 import numpy
 import pytest
 import surfel
@@ -152,11 +155,6 @@ def test_what_cannot_be_added_changes_nothing(geometry, keywords, error, words):
     assert repr(scene) == "<surfel.Scene of 0 files and 0 objects>"
 
 
-def test_scenes_without_anything_cannot_be_rendered():
-    with pytest.raises(surfel.InvalidSetting, match="no objects"):
-        surfel.Scene().render()
-
-
 def test_parents_move_their_children(points):
     scene = surfel.Scene()
     scene.add(surfel.Cloud(points), name="ground", translate=(5, 0, 0))
@@ -188,6 +186,48 @@ def test_rays_need_a_surface(points):
         scene.cast_rays([down(0, 0)])
 
 
-def test_a_viewer_needs_something_to_show():
-    with pytest.raises(surfel.InvalidSetting, match="object"):
-        surfel.view(surfel.Scene())
+@pytest.mark.parametrize("keys", [{"color": "red"}, {"filter": "z > 0"}])
+def test_keywords_for_points_without_effect_on_a_mesh_are_told(points, keys):
+    scene = surfel.Scene(**SMALL)
+    scene.add(surfel.Cloud(points), **keys)
+    scene.add(SQUARE, name="board", translate=(5, 0, 0), **keys)
+    words = rf"object `board`: settings for points do not change triangles.* \[{list(keys)[0]}, material\]"
+    with pytest.warns(UserWarning, match=words) as caught:
+        scene.render()
+    assert len(caught) == 1
+
+
+def test_materials_colour_meshes_without_a_warning():
+    scene = surfel.Scene(camera_direction=(0, 0, -1), **SMALL)
+    scene.add(SQUARE, material=types.MappingProxyType({"color": "#ff0000"}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert scene.render().albedo[24, 32].tolist() == [1, 0, 0]
+
+
+def test_names_are_given_once(points):
+    scene = surfel.Scene()
+    scene.add(SQUARE, name="board")
+    with pytest.raises(surfel.InvalidSetting, match="^name: another object is `board` already; choose another name"):
+        scene.add(surfel.Cloud(points), name="board")
+    # Names that are not given are free ones.
+    scene.add(SQUARE, name="object 2")
+    assert scene.add(surfel.Cloud(points)) == 2
+    assert [thing["name"] for thing in scene.describe()["object"]] == ["board", "object 2", "object 3"]
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda scene: scene.render(),
+        lambda scene: scene.bounds,
+        lambda scene: scene.cast_rays([down(0, 0)]),
+        lambda scene: surfel.Film(scene, turntable=1),
+        lambda scene: surfel.animate(scene, "turn.gif", turntable=1),
+        lambda scene: surfel.view(scene),
+        lambda scene: surfel.load(),
+    ],
+)
+def test_scenes_without_objects_say_how_to_add_some(use):
+    with pytest.raises(surfel.InvalidSetting, match="^the scene has no objects: add a Cloud, a Mesh or a file with scene.add"):
+        use(surfel.Scene())

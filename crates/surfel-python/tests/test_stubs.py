@@ -42,7 +42,7 @@ def public(names):
 
 def test_the_binary_has_the_names_of_the_stubs():
     names = public(dir(_native))
-    assert names == (set(CLASSES) | set(FUNCTIONS)) - {"Buffer"}
+    assert names == public(set(CLASSES) | set(FUNCTIONS)) - {"Buffer"}
     for name, node in CLASSES.items():
         if name != "Buffer":
             stub = {part.name for part in node.body}
@@ -74,6 +74,19 @@ def test_every_public_name_has_a_docstring():
         if inspect.isclass(value) and value.__module__ == "surfel" and not issubclass(value, Exception):
             for member in public(dir(value)):
                 assert inspect.getdoc(getattr(value, member)), f"{name}.{member}"
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (surfel.Cloud, ["(N, 3)", "`crs`", "in the unit of the positions", "Raises `InvalidArray`"]),
+        (surfel.Mesh, ["(M, 3)", "counter-clockwise", "Raises `InvalidArray`"]),
+        (surfel.Scene, ["keys of scene files", "Raises `InvalidSetting`"]),
+        (surfel.Film, ["`turntable`", "Raises `InvalidSetting`"]),
+    ],
+)
+def test_help_about_a_class_says_what_it_takes(value, words):
+    assert [word for word in words if word not in value.__doc__] == []
 
 
 def test_the_package_is_typed():

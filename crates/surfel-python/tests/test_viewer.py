@@ -1,6 +1,10 @@
 """The viewer: its page, its end, and several at once."""
 
 import json
+import signal
+import subprocess
+import sys
+import threading
 import time
 import urllib.request
 
@@ -48,3 +52,37 @@ def test_ports_in_use_are_refused(hill):
         port = int(viewer.url.rsplit(":", 1)[1].strip("/"))
         with pytest.raises(surfel.Error, match=str(port)):
             surfel.view(scene, port=port)
+
+
+@pytest.mark.parametrize("port", [-1, 65536])
+def test_ports_out_of_range_are_refused(hill, port):
+    with pytest.raises(ValueError, match=f"^port: found {port}, expected 0 to 65535"):
+        surfel.view(surfel.load(hill), port=port)
+
+
+def test_the_nearest_keyword_is_named(hill):
+    with pytest.raises(TypeError, match="'prt'; the nearest known one is `port`"):
+        surfel.view(surfel.load(hill), prt=3)
+
+
+def test_a_script_waits_for_the_end_of_its_viewer(hill):
+    viewer = surfel.view(surfel.load(hill))
+    waits = threading.Thread(target=viewer.wait)
+    waits.start()
+    waits.join(0.3)
+    assert waits.is_alive() and fetch(viewer.url)
+    viewer.close()
+    waits.join(30)
+    assert not waits.is_alive()
+    viewer.wait()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGINT is sent to a process")
+def test_ctrl_c_ends_a_script_that_waits(hill):
+    code = "import surfel, sys; v = surfel.view(surfel.load(sys.argv[1])); print(v.url, flush=True); v.wait(); print('over')"
+    script = subprocess.Popen([sys.executable, "-c", code, hill], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    url = script.stdout.readline().strip()
+    assert fetch(url) and script.poll() is None
+    script.send_signal(signal.SIGINT)
+    out, err = script.communicate(timeout=60)
+    assert (out, err, script.returncode) == ("over\n", "", 0)

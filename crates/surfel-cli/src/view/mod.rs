@@ -181,6 +181,11 @@ impl RunningViewer {
         Ok(Self { link, frame_ancestors, is_stopped, thread })
     }
 
+    /// Returns true once the server has ended, as where the files could not be read.
+    pub fn is_finished(&self) -> bool {
+        self.thread.is_finished()
+    }
+
     /// Stops the server and returns what ended it, if that was something else.
     ///
     /// # Errors

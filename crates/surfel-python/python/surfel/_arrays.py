@@ -4,9 +4,14 @@ from surfel._errors import InvalidArray
 
 
 def as_array(name, values):
-    """Anything that is an array or can be one: numpy, `__array_interface__`, buffers, `__dlpack__`, sequences."""
+    """Anything that is an array or can be one: numpy, `__array_interface__`, buffers, `__dlpack__`, sequences.
+
+    Masked numbers become NaN.
+    """
     import numpy
 
+    if isinstance(values, numpy.ma.MaskedArray):
+        return _nan_where_masked(values)
     known = ("__array_interface__", "__array__", "__array_struct__")
     try:
         if hasattr(values, "__dlpack__") and not any(hasattr(values, way) for way in known):
@@ -39,11 +44,25 @@ def scalars(name, values, n_points):
     return _contiguous(name, array.astype(code) if code else array, ("u1", "u2", "i4", "f4", "f8"))
 
 
+def named_columns(columns):
+    """Columns by their names, as a dict: of any mapping, or of a table.
+
+    Raises `TypeError` for anything else.
+    """
+    if not hasattr(columns, "keys"):
+        raise TypeError(f"scalars: found {_kind(columns)}, expected names with columns, as {{'age': age}}")
+    named = dict(columns)
+    for name in named:
+        if not isinstance(name, str):
+            raise TypeError(f"scalars: found the name {name!r}, expected text, as in {{'age': age}}")
+    return named
+
+
 def classes(values, n_points):
     """ASPRS classes from 0 to 255."""
     import numpy
 
-    array = _shaped("classification", as_array("classification", values), (n_points,))
+    array = _shaped("classification", _unmasked("classification", values), (n_points,))
     if array.dtype.kind not in "iub":
         raise InvalidArray(f"classification: found dtype {array.dtype}, expected integers from 0 to 255")
     if array.size and not 0 <= array.min() <= array.max() <= 255:
@@ -55,7 +74,7 @@ def indices(name, values, n_columns, limit):
     """Rows of indices below `limit`, as uint32."""
     import numpy
 
-    array = _shaped(name, as_array(name, values), (None, n_columns))
+    array = _shaped(name, _unmasked(name, values), (None, n_columns))
     if array.dtype.kind not in "iu":
         raise InvalidArray(f"{name}: found dtype {array.dtype}, expected integers")
     if array.size and not 0 <= array.min() <= array.max() < limit:
@@ -68,7 +87,7 @@ def colors(values, n_points):
     """sRGB colours of 16 bits a channel, from uint8, uint16 or numbers from 0 to 1; alpha is left out."""
     import numpy
 
-    array = as_array("colors", values)
+    array = _unmasked("colors", values)
     if array.ndim != 2 or len(array) != n_points or array.shape[1] not in (3, 4):
         raise InvalidArray(f"colors: found shape {array.shape}, expected ({n_points}, 3) or ({n_points}, 4)")
     array = array[:, :3]
@@ -89,6 +108,27 @@ def colors(values, n_points):
         found = f"{array.min()} to {array.max()}" if array.size and array.dtype.kind in "iu" else "numbers"
         raise InvalidArray(f"colors: found {found} of dtype {array.dtype}, expected {expected}")
     return numpy.ascontiguousarray(array)
+
+
+def _nan_where_masked(values):
+    import numpy
+
+    mask = numpy.ma.getmaskarray(values)
+    if not mask.any() or values.dtype.kind not in "fiub":
+        return numpy.asarray(values.data)
+    wide = values.data.astype(values.dtype if values.dtype.kind == "f" else "f8")
+    wide[mask] = numpy.nan
+    return wide
+
+
+def _unmasked(name, values):
+    """An array of what has no NaN, which masked values would become."""
+    import numpy
+
+    n_masked = numpy.ma.getmaskarray(values).sum() if isinstance(values, numpy.ma.MaskedArray) else 0
+    if n_masked:
+        raise InvalidArray(f"{name}: found {n_masked} masked values, expected none; fill them first, as by `{name}.filled(0)`")
+    return as_array(name, values)
 
 
 def _shaped(name, array, shape):

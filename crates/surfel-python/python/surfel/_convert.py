@@ -14,7 +14,8 @@ def cloud_columns(source):
     """The columns of a cloud as keywords of `Cloud`, or `None` if `source` is an array of positions."""
     if isinstance(source, (str, os.PathLike)):
         raise InvalidArray(f"points: found the path {os.fspath(source)}, expected an array (N, 3); surfel.read_cloud reads files")
-    for reader in (_laspy, _open3d, _open3d_tensor, _pyvista, _trimesh, _table):
+    _refuse_blocks(source)
+    for reader in (_surfel, _laspy, _open3d, _open3d_tensor, _pyvista, _trimesh, _table):
         columns = reader(source)
         if columns is not None:
             return {name: values for name, values in columns.items() if values is not None}
@@ -26,7 +27,14 @@ def cloud_columns(source):
 
 
 def mesh_columns(source):
-    """The vertices and triangles of a mesh as keywords of `Mesh`, or `None` if `source` is none."""
+    """The vertices and triangles of a mesh as keywords of `Mesh`, or `None` if `source` is none.
+
+    Raises `InvalidArray` for grids of PyVista, of which it is not clear what is to be shown.
+    """
+    _refuse_blocks(source)
+    if _has(source, "n_cells", "point_data", "extract_surface") and not hasattr(source, "faces") and source.n_cells:
+        advice = "`.extract_surface()` makes the mesh of its surface, surfel.Cloud(grid) takes its points"
+        raise InvalidArray(f"found a {type(source).__name__}, expected a mesh of triangles; {advice}")
     if _has(source, "vertices", "triangles", "has_triangles"):
         columns = {"vertices": source.vertices, "triangles": source.triangles}
         return columns | _if_filled(normals=source.vertex_normals, colors=source.vertex_colors)
@@ -61,6 +69,19 @@ def _has(source, *names):
 
 def _if_filled(**columns):
     return {name: values for name, values in columns.items() if values is not None and len(values)}
+
+
+def _refuse_blocks(source):
+    if _has(source, "combine", "n_blocks"):
+        advice = "`.extract_surface()` makes one mesh of the surfaces of its blocks; or add each block by itself"
+        raise InvalidArray(f"found a {type(source).__name__} of {source.n_blocks} blocks, expected one cloud or mesh; {advice}")
+
+
+def _surfel(cloud):
+    if not _has(cloud, "local_points", "origin"):
+        return None
+    names = ("points", "normals", "radii", "colors", "intensity", "classification", "scalars", "crs")
+    return {name: getattr(cloud, name) for name in names}
 
 
 def _laspy(las):

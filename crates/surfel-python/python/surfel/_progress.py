@@ -15,9 +15,15 @@ def bar():
 class _Line:
     """One line on stderr, written over and over."""
 
+    def __init__(self):
+        self.width = 0
+
     def __call__(self, stage, done, total):
         share = f"{100 * min(done, total) // total:3} %" if total else ""
-        print(f"\r{stage:>12} {share}", end="", file=sys.stderr, flush=True)
+        line = f"{stage:>12} {share}"
+        # Blanks hide the end of a longer line also where no terminal is told to clear it.
+        print(f"\r{line:{self.width}}", end="", file=sys.stderr, flush=True)
+        self.width = len(line)
 
     def close(self):
         print(file=sys.stderr)

@@ -1,11 +1,21 @@
 """Rays of cameras, as Open3D makes them."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from surfel._errors import InvalidArray
 
+if TYPE_CHECKING:
+    # numpy is imported where it is needed first, which makes `import surfel` fast.
+    import numpy
+    from numpy.typing import ArrayLike, NDArray
 
-def create_rays_pinhole(fov_deg, center, eye, up, width_px, height_px):
+
+def create_rays_pinhole(
+    fov_deg: float, center: ArrayLike, eye: ArrayLike, up: ArrayLike, width_px: int, height_px: int
+) -> NDArray[numpy.float64]:
     """Rays through the centres of a pinhole camera's pixels: float64, (height_px, width_px, 6).
 
     `fov_deg` is the horizontal angle of view in degrees; `eye` looks at `center` in world coordinates, `up` points upward

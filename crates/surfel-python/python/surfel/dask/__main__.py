@@ -6,6 +6,7 @@ A frame is a line with its index and its number of bytes, and the bytes of its f
 import concurrent.futures
 import json
 import sys
+from typing import Any
 
 from distributed import Client
 
@@ -13,7 +14,7 @@ from surfel.dask import ClusterLost, Recipe, render_frames
 from surfel.dask._frames import completed
 
 
-def main():
+def main() -> int:
     """Renders a job; returns the exit code."""
     job = json.load(sys.stdin)
     recipe = Recipe(*job["files"], _scene=job["scene"])
@@ -31,7 +32,7 @@ def main():
     return 0
 
 
-def write_frames(client, recipe, job):
+def write_frames(client: Client, recipe: Recipe, job: dict[str, Any]) -> None:
     """Writes frames in the order in which they are finished."""
     pictures = render_frames(recipe, job["frames"], format=job["format"])
     for index, content in completed(client, job["frames"], pictures):

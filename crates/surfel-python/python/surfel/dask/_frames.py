@@ -1,5 +1,7 @@
 """Frames of a film."""
 
+from __future__ import annotations
+
 import concurrent.futures
 import contextlib
 import hashlib
@@ -7,42 +9,61 @@ import os
 import pathlib
 import re
 import uuid
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import dask
+from dask.delayed import Delayed
 
 from surfel._errors import InaccessibleFile, InvalidSetting
 from surfel.dask import _worker
-from surfel.dask._recipe import ClusterLost
+from surfel.dask._recipe import ClusterLost, Recipe, check_recipe
 
 
-def render_frames(recipe, frames, *, format="png"):
+def render_frames(recipe: Recipe, frames: Iterable[int], *, format: str = "png") -> list[Delayed]:
     """Frames of the recipe's film as a list of `dask.delayed` bytes, each a file of this format.
 
     `frames`: indices from 0, as `range(100)`. The recipe needs `turntable`, or a scene that moves.
+
+    Raises `InvalidSetting` for negative indices and for formats that are none of pictures.
     """
+    check_recipe(recipe)
+    _worker.check_format(format)
     render = dask.delayed(_frame, pure=True)
-    return [render(recipe, int(index), format) for index in frames]
+    return [render(recipe, index, format) for index in _indices(frames)]
 
 
-def save_frames(recipe, frames, pattern):
+def _indices(frames: Iterable[int]) -> list[int]:
+    if not hasattr(frames, "__iter__"):
+        raise InvalidSetting(f"frames: found {frames!r}, expected indices from 0, as range(100)")
+    indices = [int(index) for index in frames]
+    if indices and min(indices) < 0:
+        raise InvalidSetting(f"frames: found {min(indices)}, expected indices from 0, as range(100)")
+    return indices
+
+
+def save_frames(recipe: Recipe, frames: Iterable[int], pattern: str | os.PathLike[str]) -> list[str]:
     """Renders frames and writes each to a file of this machine, `####` in whose name is its number from 1.
 
     Returns the names. Frames that a call with the same recipe has written are kept, so that an interrupted film goes on;
     the file `.PATTERN.recipe` beside them lists them.
 
-    Raises `InvalidSetting` for a pattern without `#`, `InaccessibleFile` if there is no such folder or a file cannot be
-    written, and `ClusterLost` if the scheduler vanishes.
+    Raises `InvalidSetting` for a pattern without `#` and as `render_frames` does, `InaccessibleFile` if there is no such
+    folder or a file cannot be written, and `ClusterLost` if the scheduler vanishes.
     """
+    check_recipe(recipe)
     pattern = os.path.abspath(os.fspath(pattern))
     folder, name = os.path.split(pattern)
     if "#" not in name:
         raise InvalidSetting("pattern: found no #, expected a name as in frame_####.png")
     if not os.path.isdir(folder):
         raise InaccessibleFile(f"{pattern}: cannot be written: there is no folder `{folder}`; create it first")
-    names = {index: _frame_name(pattern, index) for index in frames}
+    format = pathlib.Path(pattern).suffix[1:]
+    _worker.check_format(format)
+    names = {index: _frame_name(pattern, index) for index in _indices(frames)}
     log = _FrameLog(pattern, recipe)
     missing = [index for index, name in names.items() if index not in log.done or not os.path.exists(name)]
-    pictures = render_frames(recipe, missing, format=pathlib.Path(pattern).suffix[1:])
+    pictures = render_frames(recipe, missing, format=format)
     client = getattr(dask.base.get_scheduler(), "__self__", None)
     if client is None:
         # Threads and processes of this machine, which need not hand the bytes on.
@@ -57,28 +78,28 @@ def save_frames(recipe, frames, pattern):
     return list(names.values())
 
 
-def completed(client, indices, pictures):
+def completed(client: Any, indices: Iterable[int], pictures: list[Delayed]) -> Iterator[tuple[int, bytes]]:
     """Pairs of an index and the bytes of its picture, in the order in which a cluster finishes them."""
     from distributed import as_completed
 
     futures = client.compute(pictures)
-    indices = dict(zip(futures, indices))
+    index_of = dict(zip(futures, indices))
     for future, content in as_completed(futures, with_results=True):
         # Where the scheduler has vanished, the error stands in place of the bytes.
         if isinstance(content, concurrent.futures.CancelledError):
             raise content
-        yield indices[future], content
+        yield index_of[future], content
         # The workers need not keep it.
         future.release()
 
 
-def _frame(recipe, index, format):
+def _frame(recipe: Recipe, index: int, format: str) -> bytes:
     # A film ends where the recipe says; an index beyond is the caller's mistake.
     film = _worker.film(recipe)
     return _worker.bytes_of_file(format, lambda path: film._save(index, path))
 
 
-def _frame_name(pattern, index):
+def _frame_name(pattern: str, index: int) -> str:
     folder, name = os.path.split(pattern)
     return os.path.join(folder, re.sub("#+", lambda hashes: str(index + 1).zfill(len(hashes[0])), name, count=1))
 
@@ -89,7 +110,7 @@ class _FrameLog:
     A picture alone does not prove that its frame is done: it may be that of another recipe.
     """
 
-    def __init__(self, pattern, recipe):
+    def __init__(self, pattern: str, recipe: Recipe) -> None:
         folder, name = os.path.split(pattern)
         self.file = os.path.join(folder, f".{name}.recipe")
         digest = hashlib.sha256(recipe._identity().encode()).hexdigest()
@@ -107,7 +128,7 @@ class _FrameLog:
         _replace(self.file, "\n".join(lines).encode())
 
 
-def _write(log, index, name, content):
+def _write(log: str, index: int, name: str, content: bytes) -> None:
     """Writes a frame, then its number into the log."""
     _replace(name, content)
     try:
@@ -117,7 +138,7 @@ def _write(log, index, name, content):
         raise InaccessibleFile(f"{log}: cannot be written: {error.strerror}") from error
 
 
-def _replace(name, content):
+def _replace(name: str, content: bytes) -> None:
     """Writes a file beside its name first, so that no half file is ever under it."""
     beside = f"{name}.{uuid.uuid4().hex}.part"
     try:

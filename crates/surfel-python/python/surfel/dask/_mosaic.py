@@ -1,11 +1,17 @@
 """One plan of many survey tiles, each rendered with a rim of its neighbours."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import dask
+from dask.delayed import Delayed
 
 from surfel._errors import InvalidSetting
 from surfel.dask import _worker
+from surfel.dask._recipe import Recipe, check_recipe
 from surfel.dask._tiles import resolution
 
 #: Points of a tile from which what the recipes leave open is chosen.
@@ -15,7 +21,7 @@ N_SURVEYED = 100_000
 _SHARED = ("background", "color", "light", "range", "sky", "sun")
 
 
-def render_mosaic(recipes, *, rim=None, format="png"):
+def render_mosaic(recipes: Iterable[Recipe], *, rim: float | None = None, format: str = "png") -> Delayed:
     """One plan of survey tiles as `dask.delayed` bytes of a file: of each recipe the tile, with a rim of its neighbours.
 
     `recipes`: a `Recipe` for each tile, which differ in their files alone, with `gsd`; the plan looks straight down, and
@@ -24,9 +30,10 @@ def render_mosaic(recipes, *, rim=None, format="png"):
     the recipes leave open (exposure, range of colours, reach of the sky's shade) is chosen once for all, from points of
     each tile. No machine reads more than a tile and the neighbours that its rim touches. `format="tif"` gives a GeoTIFF.
 
-    Raises `InvalidSetting` for recipes that do not fit together.
+    Raises `InvalidSetting` for recipes that do not fit together, and for formats that are none of pictures.
     """
     recipes = tuple(recipes)
+    _worker.check_format(format)
     _check(recipes, rim)
     survey = dask.delayed(_survey, pure=True)
     layout = dask.delayed(Layout, pure=True)(recipes, [survey(recipe) for recipe in recipes], rim)
@@ -34,9 +41,11 @@ def render_mosaic(recipes, *, rim=None, format="png"):
     return dask.delayed(_joined, pure=True)(layout, [part(layout, i) for i in range(len(recipes))], format)
 
 
-def _check(recipes, rim):
+def _check(recipes: tuple[Recipe, ...], rim: float | None) -> None:
     if not recipes:
         raise InvalidSetting("recipes: found none, expected one for each tile")
+    for recipe in recipes:
+        check_recipe(recipe)
     keys = recipes[0].keys
     for recipe in recipes:
         if recipe.keys != keys:
@@ -50,7 +59,7 @@ def _check(recipes, rim):
         raise InvalidSetting(f"rim: found {rim}, expected a length")
 
 
-def _survey(recipe):
+def _survey(recipe: Recipe) -> tuple[dict[str, Any], list[list[float]], tuple[float, float] | None]:
     """The properties of a tile: its description, its corners, and the range of its colours."""
     thinned = {"subsample": f"random:{N_SURVEYED}", "up": "+Z"} | recipe.keys
     scene = recipe.derived(recipe.paths, **thinned).scene()
@@ -64,7 +73,7 @@ class Layout:
     first to before the second.
     """
 
-    def __init__(self, recipes, surveys, rim):
+    def __init__(self, recipes: tuple[Recipe, ...], surveys: list[Any], rim: float | None) -> None:
         self.recipes = recipes
         gsd = self.gsd = float(recipes[0].keys["gsd"])
         edges = [_edges(description, gsd) for description, _, _ in surveys]
@@ -77,7 +86,7 @@ class Layout:
         self.rim = self._automatic_rim(surveys) if rim is None else float(rim)
         self.regions = self._regions()
 
-    def _camera_keys(self, surveys):
+    def _camera_keys(self, surveys: list[Any]) -> dict[str, Any]:
         x = self.gsd * (self.left + self.width / 2)
         y = self.gsd * (self.top - self.height / 2)
         cameras = [description["camera"] for description, _, _ in surveys]
@@ -88,7 +97,7 @@ class Layout:
             "camera_view_up": (0, 1, 0),
         }
 
-    def _automatic_rim(self, surveys):
+    def _automatic_rim(self, surveys: list[Any]) -> float:
         description = surveys[0][0]
         height = max(high[2] for _, (_, high), _ in surveys) - min(low[2] for _, (low, _), _ in surveys)
         sky = self.keys.get("sky", {})
@@ -99,7 +108,7 @@ class Layout:
         largest = max(max(x1 - x0, y1 - y0) for (x0, x1), (y0, y1) in self.windows)
         return min(max(reach, self.gsd), largest * self.gsd)
 
-    def owners(self):
+    def owners(self) -> Any:
         """The tile that each pixel shows, by its number; -1 where none is near."""
         import numpy
 
@@ -111,7 +120,7 @@ class Layout:
                 _grown(owners, self.windows[i], margin)[...] = i
         return owners
 
-    def _regions(self):
+    def _regions(self) -> list[Any]:
         import numpy
 
         owners, n_pixels = self.owners(), math.ceil(self.rim / self.gsd)
@@ -124,14 +133,14 @@ class Layout:
             regions.append(spans and tuple((int(first), int(end)) for first, end in spans))
         return regions
 
-    def recipe(self, i):
+    def recipe(self, i: int) -> Recipe:
         """The recipe of a tile with its rim."""
         area = self._area(self.windows[i])
         near = [j for j, window in enumerate(self.windows) if _overlap(area, self._area(window, 0))]
         paths = dict.fromkeys(path for j in near for path in self.recipes[j].paths)
         return self.recipes[i].derived(paths, **self.keys, crop=area)
 
-    def _area(self, window, rim=None):
+    def _area(self, window: Any, rim: float | None = None) -> tuple[float, ...]:
         (x0, x1), (y0, y1) = window
         rim = self.rim if rim is None else rim
         west, east = (self.gsd * (self.left + x) for x in (x0, x1))
@@ -139,7 +148,7 @@ class Layout:
         return (west - rim, south - rim, east + rim, north + rim)
 
 
-def _edges(description, gsd):
+def _edges(description: dict[str, Any], gsd: float) -> tuple[int, int, int, int]:
     """Left, top, right and bottom of a tile's plan, in pixels from the origin of the coordinates."""
     width, height = (int(side) for side in description["resolution"].split("x"))
     x, y, _ = description["camera"]["focal_point"]
@@ -147,7 +156,7 @@ def _edges(description, gsd):
     return left, top, left + width, top - height
 
 
-def _shared_keys(surveys):
+def _shared_keys(surveys: list[Any]) -> dict[str, Any]:
     first = surveys[0][0]
     keys = {key: first[key] for key in _SHARED if key in first} | {"up": "+Z"}
     exposures = sorted(description["exposure"] for description, _, _ in surveys)
@@ -162,16 +171,16 @@ def _shared_keys(surveys):
     return keys
 
 
-def _grown(pixels, window, margin):
+def _grown(pixels: Any, window: Any, margin: int) -> Any:
     (x0, x1), (y0, y1) = window
     return pixels[max(0, y0 - margin) : y1 + margin, max(0, x0 - margin) : x1 + margin]
 
 
-def _overlap(a, b):
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
     return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
 
 
-def _part(layout, i):
+def _part(layout: Layout, i: int) -> Any:
     """The pixels of a tile's region and the classes of its points; none if it has no pixel."""
     region = layout.regions[i]
     if region is None:
@@ -180,7 +189,7 @@ def _part(layout, i):
     return scene._render_region(*region), scene._classes()
 
 
-def _joined(layout, parts, format):
+def _joined(layout: Layout, parts: list[Any], format: str) -> bytes:
     import numpy
 
     color = numpy.full((layout.height, layout.width, 4), numpy.nan, numpy.float32)

@@ -1,32 +1,49 @@
 """The cache of a worker: prepared scenes and films, the last used ones, as many as memory allows."""
 
+from __future__ import annotations
+
 import collections
 import os
 import pathlib
 import tempfile
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import dask
 
 import surfel
+from surfel._errors import InvalidSetting
+from surfel.dask._recipe import Recipe
+
+#: Extensions of the files that pictures are saved to.
+FORMATS = ("png", "jpg", "jpeg", "webp", "tif", "tiff", "exr")
 
 
-def scene(recipe):
+def check_format(format: str) -> None:
+    """Raises `InvalidSetting` for anything but the extension of a picture."""
+    if format not in FORMATS:
+        raise InvalidSetting(f"format: found {format!r}, expected one of {', '.join(FORMATS)}")
+
+
+def scene(recipe: Recipe) -> surfel.Scene:
     """The scene of a recipe, which is made unless it is kept."""
-    return _KEPT.get(("scene", recipe), recipe.scene)
+    kept: surfel.Scene = _KEPT.get(("scene", recipe), recipe.scene)
+    return kept
 
 
-def film(recipe):
+def film(recipe: Recipe) -> surfel.Film:
     """The film of a recipe, which is made unless it is kept."""
-    return _KEPT.get(("film", recipe), lambda: surfel.Film(recipe.scene()))
+    kept: surfel.Film = _KEPT.get(("film", recipe), lambda: surfel.Film(recipe.scene()))
+    return kept
 
 
-def encoded(image, format):
+def encoded(image: surfel.Image, format: str) -> bytes:
     """The bytes of a picture as a file of this format."""
     return bytes_of_file(format, image.save)
 
 
-def bytes_of_file(format, save):
+def bytes_of_file(format: str, save: Callable[[pathlib.Path], None]) -> bytes:
     """The bytes of the file of this format that `save` writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / f"picture.{format}"
@@ -34,41 +51,41 @@ def bytes_of_file(format, save):
         return path.read_bytes()
 
 
-def memory_limit():
+def memory_limit() -> int:
     """Bytes that kept scenes may take: `surfel.scene-memory` of `dask.config`, or half of what the worker may have."""
     stated = dask.config.get("surfel.scene-memory", None)
-    return dask.utils.parse_bytes(stated) if stated is not None else _memory_of_worker() // 2
+    return int(dask.utils.parse_bytes(stated)) if stated is not None else _memory_of_worker() // 2
 
 
-def _memory_of_worker():
+def _memory_of_worker() -> int:
     try:
         from distributed import get_worker
         from distributed.system import MEMORY_LIMIT
     except ImportError:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 << 30
     try:
-        return get_worker().memory_manager.memory_limit or MEMORY_LIMIT
+        return int(get_worker().memory_manager.memory_limit or MEMORY_LIMIT)
     except ValueError:
-        return MEMORY_LIMIT
+        return int(MEMORY_LIMIT)
 
 
 class _Kept:
     """A value, once it is made, and the bytes that it takes."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.value = None
+        self.value: Any = None
         self.n_bytes = 0
 
 
 class Cache:
     """The last used values that fit into memory, and the newest even if it does not. Threads share it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._kept = collections.OrderedDict()
+        self._kept: collections.OrderedDict[Any, _Kept] = collections.OrderedDict()
 
-    def get(self, key, make):
+    def get(self, key: Any, make: Callable[[], Any]) -> Any:
         """The value of a key. Threads that want the same one wait until one of them has made it."""
         with self._lock:
             kept = self._kept.setdefault(key, _Kept())
@@ -78,12 +95,12 @@ class Cache:
                 kept.value, kept.n_bytes = self._made(key, make)
             return kept.value
 
-    def keys(self):
+    def keys(self) -> list[Any]:
         """The keys of the values, the last used one at the end."""
         with self._lock:
             return list(self._kept)
 
-    def _made(self, key, make):
+    def _made(self, key: Any, make: Callable[[], Any]) -> tuple[Any, int]:
         try:
             value = make()
             n_bytes = value._memory_estimate()
@@ -94,7 +111,7 @@ class Cache:
         self._drop_until(memory_limit() - n_bytes, key)
         return value, n_bytes
 
-    def _drop_until(self, limit, key):
+    def _drop_until(self, limit: int, key: Any) -> None:
         """Drops the values that were used longest ago, until the others but that of `key` fit."""
         with self._lock:
             others = [other for other in self._kept if other != key]

@@ -3,14 +3,14 @@
 use super::super::cloud::surface_of;
 use super::LoadedScene;
 use crate::description::{
-    ColorSettings, KeyedSettings, LightKind, PreparationSettings, SceneDescription,
+    ColorSettings, KeyedSettings, LightKind, ObjectSettings, PreparationSettings, SceneDescription,
     SurfaceSettings, misspelled, write_table,
 };
 use surfel_core::points::{PointCloud, StructureChoice};
 use surfel_core::progress::Progress;
 use surfel_core::render::MIN_ADAPTIVE_SAMPLES;
-use surfel_core::scene::Background;
 use surfel_core::scene::color::ColorSource;
+use surfel_core::scene::{Background, Geometry};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::{BitDepth, FileInfo, TextColumn};
 
@@ -120,27 +120,44 @@ impl LoadedScene {
         }
     }
 
-    /// Warns of settings that choose or colour points in a scene without points.
+    /// Warns of settings that choose or colour points in a scene, or in an object, without points.
     fn report_unused_of_points(&self, description: &SceneDescription, progress: &dyn Progress) {
-        if self.graph.geometries.is_empty() || self.clouds().next().is_some() {
+        if self.graph.geometries.is_empty() {
             return;
         }
-        let settings = &description.objects_default;
-        let PreparationSettings { filter, class, returns, .. } = &settings.preparation;
-        let all = [
-            ("color", settings.color.color.is_some()),
-            ("filter", filter.is_some()),
-            ("class", class.is_some()),
-            ("returns", returns.is_some()),
-        ];
-        let keys: Vec<&str> =
-            all.iter().filter(|(_, is_set)| *is_set).map(|(key, _)| *key).collect();
-        if !keys.is_empty() {
-            let line = "settings for points do not change triangles, which keep the colours of their \
-                        materials and vertices";
-            progress.warning(line, &keys);
+        const LINE: &str = "settings for points do not change triangles, which keep the colours of their materials and vertices";
+        let keys = keys_of_points(&description.objects_default);
+        if !keys.is_empty() && self.clouds().next().is_none() {
+            progress.warning(LINE, &keys);
+        }
+        for (nodes, object) in self.objects.iter().zip(&description.objects) {
+            let mut keys = keys_of_points(&object.settings);
+            // The files of a sequence are read when they are shown.
+            let is_known = object.files.len() == 1 || object.merge();
+            let nodes = &self.graph.nodes[nodes.all.clone()];
+            let mut primitives = nodes.iter().flat_map(|node| &node.primitives);
+            let geometries = &self.graph.geometries;
+            let has_points = primitives
+                .any(|primitive| matches!(geometries[primitive.geometry], Geometry::Points(_)));
+            if is_known && !has_points && !keys.is_empty() {
+                keys.push("material");
+                let line = format!("object `{}`: {LINE}", object.name());
+                progress.warning(&line, &keys);
+            }
         }
     }
+}
+
+/// Returns the keys that are set of those that choose or colour points.
+fn keys_of_points(settings: &ObjectSettings) -> Vec<&'static str> {
+    let PreparationSettings { filter, class, returns, .. } = &settings.preparation;
+    let all = [
+        ("color", settings.color.color.is_some()),
+        ("filter", filter.is_some()),
+        ("class", class.is_some()),
+        ("returns", returns.is_some()),
+    ];
+    all.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
 }
 
 /// Warns of settings of lights that do not shine.
