@@ -21,10 +21,7 @@ pub fn choose_source(cloud: &PointCloud) -> (ColorSource, String) {
         None => "no colours in the file",
     };
     if is_georeferenced_land(cloud) {
-        return (
-            ColorSource::Elevation,
-            format!("{colors}; the points are those of land, wide, flat and georeferenced"),
-        );
+        return (ColorSource::Elevation, format!("{colors}; wide, flat and georeferenced land"));
     }
     let constant = ColorSource::Constant(DEFAULT_COLOR);
     match &cloud.intensity {
