@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use surfel::crs::short_name;
 use surfel::description::Section;
 use surfel::resolve::{MemoryEstimate, up_convention};
-use surfel_core::image::class_name;
+use surfel_core::image::{class_name, is_data};
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{
     COLOR_8_TO_16, PointCloud, STATION, ScanStation, Subsample, Values, have_8_bits, infer_up,
@@ -195,10 +195,9 @@ fn flags(cloud: &PointCloud) -> Map<String, Value> {
 fn columns(cloud: &PointCloud) -> Map<String, Value> {
     let mut columns = Map::new();
     let mut add = |name: &str, values: &mut dyn Iterator<Item = f64>| {
-        // Programs write the greatest number of the type for values that are missing.
-        let finite = values.filter(|value| value.abs() < f64::from(f32::MAX));
+        let stated = values.filter(|value| is_data(*value));
         let none = (f64::INFINITY, f64::NEG_INFINITY);
-        let (low, high) = finite.fold(none, |(low, high), v| (v.min(low), v.max(high)));
+        let (low, high) = stated.fold(none, |(low, high), v| (v.min(low), v.max(high)));
         let range = if low <= high { json!([low, high]) } else { Value::Null };
         columns.insert(name.to_owned(), range);
     };

@@ -110,7 +110,7 @@ fn all_encodings_hold_the_same_points() {
         assert_eq!(loaded.cloud.world_position(0), DVec3::new(1e6, 2.0, 3.5), "{name}");
         assert!(loaded.cloud.positions[1].z.is_nan(), "{name}");
         assert_eq!(loaded.cloud.colors, Some(vec![[65535, 0, 65535], [0, 65535, 0]]), "{name}");
-        assert_eq!(loaded.cloud.classification, Some(vec![7, 8]), "{name}");
+        assert_eq!(loaded.cloud.scalar("label"), Some(&Values::U16(vec![7, 8])), "{name}");
         assert_eq!(loaded.cloud.scalar("histogram_1"), Some(&Values::F32(vec![-1.0, 2.0])));
         assert!(loaded.cloud.scalar("_").is_none() && loaded.cloud.scalar("_0").is_none());
         assert_eq!(loaded.info.columns, ascii.info.columns, "{name}");
