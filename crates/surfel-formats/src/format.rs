@@ -122,7 +122,7 @@ pub const FORMATS: &[Format] = &[
         name: "PCD",
         extensions: &["pcd"],
         signature: None,
-        probe: |input| input.starts_with(b"# .PCD"),
+        probe: pcd::is_pcd,
         inspect: pcd::inspect,
         read: Reader::Points(pcd::read),
         writer: None,
@@ -131,7 +131,7 @@ pub const FORMATS: &[Format] = &[
         name: "PTX",
         extensions: &["ptx"],
         signature: None,
-        probe: |_| false,
+        probe: ptx::is_ptx,
         inspect: ptx::inspect,
         read: Reader::Points(ptx::read),
         writer: None,
@@ -348,6 +348,22 @@ mod tests {
             let kind = name.to_ascii_lowercase().replace("a.", "");
             assert!(
                 message.to_ascii_lowercase().contains(&format!("{kind} file of trained")),
+    #[test]
+    fn ptx_and_pcd_are_known_by_their_first_lines() {
+        let ptx =
+            "2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n1 2 3 .5\n";
+        let pcd = "# written by hand\n\nVERSION .7\nFIELDS x y z\n";
+        for name in ["-", "scan.txt", "scan"] {
+            assert_eq!(detected(name, ptx.as_bytes()).unwrap(), "PTX", "{name}");
+            assert_eq!(detected(name, pcd.as_bytes()).unwrap(), "PCD", "{name}");
+            assert_eq!(detected(name, b"FIELDS x y z\nSIZE 4 4 4\n").unwrap(), "PCD", "{name}");
+            // The number of points before them is no grid, nor are three numbers a row of four.
+            assert_eq!(detected(name, b"2\n1 2 3\n4 5 6\n").unwrap(), "text", "{name}");
+            let short = ptx.replace("5 6 7 1", "5 6 7");
+            assert_ne!(detected(name, short.as_bytes()).ok(), Some("PTX"), "{name}");
+        }
+    }
+
                 "{message}"
             );
             assert!(message.contains("export the splats as PLY"), "{message}");

@@ -106,6 +106,18 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         let malformed = |found: String, expected: &str| {
             input.malformed(Location::Line(number), found, expected, "the header is broken")
         };
+/// Returns true if an input begins with the comment that programs write first, or with a key of the header after
+/// comments.
+pub(crate) fn is_pcd(input: &Input) -> bool {
+    /// Number of first bytes among which the key is.
+    const MAX_LENGTH: usize = 4096;
+    let start = &input[..input.len().min(MAX_LENGTH)];
+    let lines = start.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let first = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#"));
+    let is_key = |line: &[u8]| line.starts_with(b"VERSION ") || line.starts_with(b"FIELDS ");
+    start.starts_with(b"# .PCD") || first.is_some_and(is_key)
+}
+
         let rest = &text[at..];
         let Some(length) = memchr::memchr(b'\n', rest) else {
             return Err(malformed("no end of the header".into(), "a line `DATA`"));
