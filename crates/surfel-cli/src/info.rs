@@ -147,7 +147,15 @@ fn stations(cloud: &PointCloud) -> Vec<Value> {
     let stations = cloud.stations.iter().zip(n_points);
     let describe = |(station, n_points): (&ScanStation, u64)| {
         let position = station.position.map(|position| position.to_array());
-        json!({ "name": station.name, "position": position, "points": n_points })
+        let [rows, columns] = station.grid.map_or([None; 2], |grid| grid.map(Some));
+        json!({
+            "name": station.name,
+            "position": position,
+            "rotation": station.rotation.to_array(),
+            "rows": rows,
+            "columns": columns,
+            "points": n_points,
+        })
     };
     stations.map(describe).collect()
 }
@@ -277,9 +285,7 @@ fn table(info: &Value) -> String {
     row("up", up.strip_prefix("up is ").unwrap_or(&up).to_owned());
     for (i, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
         let title = if i == 0 { "stations" } else { "" };
-        let name = text(&station["name"]);
-        let points = counted(station["points"].as_u64().unwrap_or(0), "point");
-        row(title, format!("{name:<24}{points}, scanner at {}", text(&station["position"])));
+        row(title, station_text(station));
     }
     let n_points = info["points"].as_f64().unwrap_or(1.0);
     for key in ["classes", "returns", "flags"] {
@@ -312,6 +318,20 @@ fn image_text(image: &Value) -> String {
         }
     }
     line
+fn station_text(station: &Value) -> String {
+    let points = counted(station["points"].as_u64().unwrap_or(0), "point");
+    let position = text(&station["position"]);
+    let mut line = format!("{:<24}{points}, scanner at {position}", text(&station["name"]));
+    if station["rotation"] != json!([0.0, 0.0, 0.0, 1.0]) {
+        line += &format!(", rotation x y z w {}", text(&station["rotation"]));
+    }
+    if !station["rows"].is_null() {
+        let (rows, columns) = (text(&station["rows"]), text(&station["columns"]));
+        line += &format!(", {rows} rows and {columns} columns");
+    }
+    line
+}
+
 }
 
 fn range_text(range: &Value) -> String {

@@ -48,6 +48,8 @@ pub(crate) struct CloudWriter {
     pub extensions: &'static [&'static str],
     /// Writes a cloud to a path with one of the extensions.
     pub write: fn(&Path, &PointCloud, &SaveOptions, &dyn Progress) -> Result<()>,
+    /// True if names, poses and grids of stations are written.
+    pub keeps_stations: bool,
 }
 
 /// The functions that read the content of a format, by what it can contain.
@@ -98,6 +100,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(CloudWriter {
             extensions: &["ply"],
             write: |path, cloud, _, progress| ply::write(path, cloud, progress),
+            keeps_stations: true,
         }),
     },
     Format {
@@ -107,7 +110,11 @@ pub const FORMATS: &[Format] = &[
         probe: |input| input.starts_with(b"LASF"),
         inspect: las::inspect,
         read: Reader::Points(las::read),
-        writer: Some(CloudWriter { extensions: &["las", "laz"], write: las::write }),
+        writer: Some(CloudWriter {
+            extensions: &["las", "laz"],
+            write: las::write,
+            keeps_stations: false,
+        }),
     },
     Format {
         name: "E57",
@@ -169,6 +176,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(CloudWriter {
             extensions: &["xyz", "txt", "csv", "asc", "pts"],
             write: text::write,
+            keeps_stations: false,
         }),
     },
     Format {
@@ -341,14 +349,6 @@ mod tests {
     }
 
     #[test]
-    fn compressed_splats_are_refused_by_name() {
-        let gzip: &[u8] = b"\x1f\x8b\x08";
-        for (name, bytes) in [("a.splat", &[0; 32][..]), ("a.KSPLAT", &[1; 64]), ("a.spz", gzip)] {
-            let message = detected(name, bytes).unwrap_err().to_string();
-            let kind = name.to_ascii_lowercase().replace("a.", "");
-            assert!(
-                message.to_ascii_lowercase().contains(&format!("{kind} file of trained")),
-    #[test]
     fn ptx_and_pcd_are_known_by_their_first_lines() {
         let ptx =
             "2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n1 2 3 .5\n";
@@ -364,6 +364,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn compressed_splats_are_refused_by_name() {
+        let gzip: &[u8] = b"\x1f\x8b\x08";
+        for (name, bytes) in [("a.splat", &[0; 32][..]), ("a.KSPLAT", &[1; 64]), ("a.spz", gzip)] {
+            let message = detected(name, bytes).unwrap_err().to_string();
+            let kind = name.to_ascii_lowercase().replace("a.", "");
+            assert!(
+                message.to_ascii_lowercase().contains(&format!("{kind} file of trained")),
                 "{message}"
             );
             assert!(message.contains("export the splats as PLY"), "{message}");

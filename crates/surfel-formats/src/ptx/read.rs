@@ -85,6 +85,7 @@ pub(crate) fn read(
         position: Some(scan.position),
         rotation: rotation_of(&scan.rotation),
     });
+        grid: Some([scan.grid[1], scan.grid[0]]),
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
     let info = FileInfo {
         format: format!("PTX, {}", describe(&scans)),
