@@ -55,7 +55,9 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let mut salvage = Salvage::new(input, options.salvage);
-    let header = read_header(&mut salvage)?;
+    // Advice to salvage holds only if there is something to be salvaged.
+    let header =
+        read_header(&mut salvage).map_err(|error| inspect(input).err().unwrap_or(error))?;
     let pages = Pages::new(&input[..header.length]);
     let broken = pages.find_broken(progress)?;
     if let Some(page) = broken.first() {
