@@ -8,7 +8,7 @@ use crate::stdin_copy::with_stdin_named;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use surfel::crs::short_name;
+use surfel::crs::{CoordinateSystem, Unit, short_name};
 use surfel::description::Section;
 use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::{class_name, is_data};
@@ -97,6 +97,7 @@ fn summarize(file: &Path, header: &FileInfo) -> Value {
         "bounds": header.bounds.map(|[low, high]| json!({ "min": low.to_array(), "max": high.to_array() })),
         "resolution": header.resolution.map(|step| step.to_array()),
         "coordinate_system": header.coordinate_system,
+        "unit": unit(header).to_string(),
         "spherical_harmonics_degree": header.harmonics_degree,
         "columns_in_file": header.columns,
         "images": images(header),
@@ -123,6 +124,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "points_per_square_unit": points_per_area(&cloud.positions, DENSITY_CELL * distance),
         "resolution": source.resolution.map(|step| step.to_array()),
         "coordinate_system": source.coordinate_system,
+        "unit": unit(source).to_string(),
         "spherical_harmonics_degree": source.harmonics_degree,
         "up": { "axis": up.up.to_array(), "reason": up.reason },
         "stations": stations(cloud),
@@ -133,6 +135,13 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "columns_in_file": source.columns,
         "images": images(source),
     }))
+}
+
+/// Unit of the coordinates by the coordinate system, or else by the format.
+fn unit(source: &FileInfo) -> Unit {
+    let system = source.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
+    let of_format = if source.is_in_metres { Unit::Metres(1.0) } else { Unit::Unknown };
+    system.map_or(of_format, |system| system.unit())
 }
 
 /// Scans with the places of their scanners and their numbers of points.
@@ -199,7 +208,7 @@ fn flags(cloud: &PointCloud) -> Map<String, Value> {
     of_flags.map(|scalar| (scalar.name.clone(), json!(count(&scalar.values)))).collect()
 }
 
-/// Columns by name with their least and greatest values.
+/// Columns by the names that filters take, with their least and greatest values.
 fn columns(cloud: &PointCloud) -> Map<String, Value> {
     let mut columns = Map::new();
     let mut add = |name: &str, values: &mut dyn Iterator<Item = f64>| {
@@ -211,16 +220,20 @@ fn columns(cloud: &PointCloud) -> Map<String, Value> {
     };
     if let Some(colors) = &cloud.colors {
         let unit = if have_8_bits(colors) { COLOR_8_TO_16 } else { 1 };
-        add("rgb", &mut colors.iter().flatten().map(|channel| (channel / unit).into()));
+        for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
+            add(name, &mut colors.iter().map(|color| (color[channel] / unit).into()));
+        }
     }
     if let Some(values) = &cloud.intensity {
         add("intensity", &mut values.iter().map(|&value| value.into()));
     }
     if let Some(classes) = &cloud.classification {
-        add("class", &mut classes.iter().map(|&class| class.into()));
+        add("classification", &mut classes.iter().map(|&class| class.into()));
     }
     if let Some(normals) = &cloud.normals {
-        add("normal", &mut normals.iter().flat_map(|n| n.as_dvec3().to_array()));
+        for (axis, name) in ["nx", "ny", "nz"].into_iter().enumerate() {
+            add(name, &mut normals.iter().map(|normal| normal[axis].into()));
+        }
     }
     if let Some(radii) = &cloud.radii {
         add("radius", &mut radii.iter().map(|&radius| radius.into()));
@@ -261,10 +274,12 @@ fn table(info: &Value) -> String {
         // Nobody counts the corners of a mesh by area.
         let density = info["points_per_square_unit"].as_f64();
         if let Some(density) = density.filter(|_| info["triangles"].is_null()) {
-            row(
-                "density",
-                format!("{} points a square unit seen from above, about", rounded(density)),
-            );
+            let unit = match text(&info["unit"]) {
+                unit if unit == Unit::Unknown.to_string() => "unit".to_owned(),
+                unit => unit,
+            };
+            let density = rounded(density);
+            row("density", format!("{density} points a square {unit} seen from above, about"));
         }
     }
     row("resolution", text(&info["resolution"]));
@@ -272,6 +287,7 @@ fn table(info: &Value) -> String {
         "coordinates",
         info["coordinate_system"].as_str().map_or_else(|| text(&Value::Null), short_name),
     );
+    row("unit", text(&info["unit"]));
     for (i, image) in info["images"].as_array().into_iter().flatten().enumerate() {
         row(if i == 0 { "images" } else { "" }, image_text(image));
     }
@@ -302,6 +318,20 @@ fn table(info: &Value) -> String {
     lines.join("\n")
 }
 
+fn station_text(station: &Value) -> String {
+    let points = counted(station["points"].as_u64().unwrap_or(0), "point");
+    let position = text(&station["position"]);
+    let mut line = format!("{:<24}{points}, scanner at {position}", text(&station["name"]));
+    if station["rotation"] != json!([0.0, 0.0, 0.0, 1.0]) {
+        line += &format!(", rotation x y z w {}", text(&station["rotation"]));
+    }
+    if !station["rows"].is_null() {
+        let (rows, columns) = (text(&station["rows"]), text(&station["columns"]));
+        line += &format!(", {rows} rows and {columns} columns");
+    }
+    line
+}
+
 fn image_text(image: &Value) -> String {
     let resolution: Vec<String> =
         image["resolution"].as_array().into_iter().flatten().map(text).collect();
@@ -318,20 +348,6 @@ fn image_text(image: &Value) -> String {
         }
     }
     line
-fn station_text(station: &Value) -> String {
-    let points = counted(station["points"].as_u64().unwrap_or(0), "point");
-    let position = text(&station["position"]);
-    let mut line = format!("{:<24}{points}, scanner at {position}", text(&station["name"]));
-    if station["rotation"] != json!([0.0, 0.0, 0.0, 1.0]) {
-        line += &format!(", rotation x y z w {}", text(&station["rotation"]));
-    }
-    if !station["rows"].is_null() {
-        let (rows, columns) = (text(&station["rows"]), text(&station["columns"]));
-        line += &format!(", {rows} rows and {columns} columns");
-    }
-    line
-}
-
 }
 
 fn range_text(range: &Value) -> String {

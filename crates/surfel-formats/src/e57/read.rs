@@ -256,6 +256,7 @@ fn file_info(
     let names = columns.iter().map(|(role, _)| role.name().to_owned());
     FileInfo {
         format: format!("E57 1.0, {scans}"),
+        is_in_metres: true,
         n_points: Some(document.scans.iter().fold(0, |sum, scan| sum.saturating_add(scan.records))),
         bounds: bounds.and_then(|boxes| boxes.into_iter().reduce(union)),
         coordinate_system: document.coordinate_system.clone(),
