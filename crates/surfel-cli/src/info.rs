@@ -8,10 +8,10 @@ use crate::stdin_copy::with_stdin_named;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use surfel::crs::short_name;
+use surfel::crs::{CoordinateSystem, Unit, short_name};
 use surfel::description::Section;
 use surfel::resolve::{MemoryEstimate, up_convention};
-use surfel_core::image::class_name;
+use surfel_core::image::{class_name, is_data};
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{
     COLOR_8_TO_16, PointCloud, STATION, ScanStation, Subsample, Values, have_8_bits, infer_up,
@@ -97,6 +97,7 @@ fn summarize(file: &Path, header: &FileInfo) -> Value {
         "bounds": header.bounds.map(|[low, high]| json!({ "min": low.to_array(), "max": high.to_array() })),
         "resolution": header.resolution.map(|step| step.to_array()),
         "coordinate_system": header.coordinate_system,
+        "unit": unit(header).to_string(),
         "spherical_harmonics_degree": header.harmonics_degree,
         "columns_in_file": header.columns,
         "images": images(header),
@@ -123,6 +124,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "points_per_square_unit": points_per_area(&cloud.positions, DENSITY_CELL * distance),
         "resolution": source.resolution.map(|step| step.to_array()),
         "coordinate_system": source.coordinate_system,
+        "unit": unit(source).to_string(),
         "spherical_harmonics_degree": source.harmonics_degree,
         "up": { "axis": up.up.to_array(), "reason": up.reason },
         "stations": stations(cloud),
@@ -133,6 +135,13 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "columns_in_file": source.columns,
         "images": images(source),
     }))
+}
+
+/// Unit of the coordinates by the coordinate system, or else by the format.
+fn unit(source: &FileInfo) -> Unit {
+    let system = source.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
+    let of_format = if source.is_in_metres { Unit::Metres(1.0) } else { Unit::Unknown };
+    system.map_or(of_format, |system| system.unit())
 }
 
 /// Scans with the places of their scanners and their numbers of points.
@@ -147,7 +156,15 @@ fn stations(cloud: &PointCloud) -> Vec<Value> {
     let stations = cloud.stations.iter().zip(n_points);
     let describe = |(station, n_points): (&ScanStation, u64)| {
         let position = station.position.map(|position| position.to_array());
-        json!({ "name": station.name, "position": position, "points": n_points })
+        let [rows, columns] = station.grid.map_or([None; 2], |grid| grid.map(Some));
+        json!({
+            "name": station.name,
+            "position": position,
+            "rotation": station.rotation.to_array(),
+            "rows": rows,
+            "columns": columns,
+            "points": n_points,
+        })
     };
     stations.map(describe).collect()
 }
@@ -191,29 +208,32 @@ fn flags(cloud: &PointCloud) -> Map<String, Value> {
     of_flags.map(|scalar| (scalar.name.clone(), json!(count(&scalar.values)))).collect()
 }
 
-/// Columns by name with their least and greatest values.
+/// Columns by the names that filters take, with their least and greatest values.
 fn columns(cloud: &PointCloud) -> Map<String, Value> {
     let mut columns = Map::new();
     let mut add = |name: &str, values: &mut dyn Iterator<Item = f64>| {
-        // Programs write the greatest number of the type for values that are missing.
-        let finite = values.filter(|value| value.abs() < f64::from(f32::MAX));
+        let stated = values.filter(|value| is_data(*value));
         let none = (f64::INFINITY, f64::NEG_INFINITY);
-        let (low, high) = finite.fold(none, |(low, high), v| (v.min(low), v.max(high)));
+        let (low, high) = stated.fold(none, |(low, high), v| (v.min(low), v.max(high)));
         let range = if low <= high { json!([low, high]) } else { Value::Null };
         columns.insert(name.to_owned(), range);
     };
     if let Some(colors) = &cloud.colors {
         let unit = if have_8_bits(colors) { COLOR_8_TO_16 } else { 1 };
-        add("rgb", &mut colors.iter().flatten().map(|channel| (channel / unit).into()));
+        for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
+            add(name, &mut colors.iter().map(|color| (color[channel] / unit).into()));
+        }
     }
     if let Some(values) = &cloud.intensity {
         add("intensity", &mut values.iter().map(|&value| value.into()));
     }
     if let Some(classes) = &cloud.classification {
-        add("class", &mut classes.iter().map(|&class| class.into()));
+        add("classification", &mut classes.iter().map(|&class| class.into()));
     }
     if let Some(normals) = &cloud.normals {
-        add("normal", &mut normals.iter().flat_map(|n| n.as_dvec3().to_array()));
+        for (axis, name) in ["nx", "ny", "nz"].into_iter().enumerate() {
+            add(name, &mut normals.iter().map(|normal| normal[axis].into()));
+        }
     }
     if let Some(radii) = &cloud.radii {
         add("radius", &mut radii.iter().map(|&radius| radius.into()));
@@ -254,10 +274,12 @@ fn table(info: &Value) -> String {
         // Nobody counts the corners of a mesh by area.
         let density = info["points_per_square_unit"].as_f64();
         if let Some(density) = density.filter(|_| info["triangles"].is_null()) {
-            row(
-                "density",
-                format!("{} points a square unit seen from above, about", rounded(density)),
-            );
+            let unit = match text(&info["unit"]) {
+                unit if unit == Unit::Unknown.to_string() => "unit".to_owned(),
+                unit => unit,
+            };
+            let density = rounded(density);
+            row("density", format!("{density} points a square {unit} seen from above, about"));
         }
     }
     row("resolution", text(&info["resolution"]));
@@ -265,6 +287,7 @@ fn table(info: &Value) -> String {
         "coordinates",
         info["coordinate_system"].as_str().map_or_else(|| text(&Value::Null), short_name),
     );
+    row("unit", text(&info["unit"]));
     for (i, image) in info["images"].as_array().into_iter().flatten().enumerate() {
         row(if i == 0 { "images" } else { "" }, image_text(image));
     }
@@ -278,9 +301,7 @@ fn table(info: &Value) -> String {
     row("up", up.strip_prefix("up is ").unwrap_or(&up).to_owned());
     for (i, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
         let title = if i == 0 { "stations" } else { "" };
-        let name = text(&station["name"]);
-        let points = counted(station["points"].as_u64().unwrap_or(0), "point");
-        row(title, format!("{name:<24}{points}, scanner at {}", text(&station["position"])));
+        row(title, station_text(station));
     }
     let n_points = info["points"].as_f64().unwrap_or(1.0);
     for key in ["classes", "returns", "flags"] {
@@ -295,6 +316,20 @@ fn table(info: &Value) -> String {
         row(title, format!("{name:<24}{}", range_text(range)));
     }
     lines.join("\n")
+}
+
+fn station_text(station: &Value) -> String {
+    let points = counted(station["points"].as_u64().unwrap_or(0), "point");
+    let position = text(&station["position"]);
+    let mut line = format!("{:<24}{points}, scanner at {position}", text(&station["name"]));
+    if station["rotation"] != json!([0.0, 0.0, 0.0, 1.0]) {
+        line += &format!(", rotation x y z w {}", text(&station["rotation"]));
+    }
+    if !station["rows"].is_null() {
+        let (rows, columns) = (text(&station["rows"]), text(&station["columns"]));
+        line += &format!(", {rows} rows and {columns} columns");
+    }
+    line
 }
 
 fn image_text(image: &Value) -> String {

@@ -48,6 +48,8 @@ pub(crate) struct CloudWriter {
     pub extensions: &'static [&'static str],
     /// Writes a cloud to a path with one of the extensions.
     pub write: fn(&Path, &PointCloud, &SaveOptions, &dyn Progress) -> Result<()>,
+    /// True if names, poses and grids of stations are written.
+    pub keeps_stations: bool,
 }
 
 /// The functions that read the content of a format, by what it can contain.
@@ -98,6 +100,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(CloudWriter {
             extensions: &["ply"],
             write: |path, cloud, _, progress| ply::write(path, cloud, progress),
+            keeps_stations: true,
         }),
     },
     Format {
@@ -107,7 +110,11 @@ pub const FORMATS: &[Format] = &[
         probe: |input| input.starts_with(b"LASF"),
         inspect: las::inspect,
         read: Reader::Points(las::read),
-        writer: Some(CloudWriter { extensions: &["las", "laz"], write: las::write }),
+        writer: Some(CloudWriter {
+            extensions: &["las", "laz"],
+            write: las::write,
+            keeps_stations: false,
+        }),
     },
     Format {
         name: "E57",
@@ -122,7 +129,7 @@ pub const FORMATS: &[Format] = &[
         name: "PCD",
         extensions: &["pcd"],
         signature: None,
-        probe: |input| input.starts_with(b"# .PCD"),
+        probe: pcd::is_pcd,
         inspect: pcd::inspect,
         read: Reader::Points(pcd::read),
         writer: None,
@@ -131,7 +138,7 @@ pub const FORMATS: &[Format] = &[
         name: "PTX",
         extensions: &["ptx"],
         signature: None,
-        probe: |_| false,
+        probe: ptx::is_ptx,
         inspect: ptx::inspect,
         read: Reader::Points(ptx::read),
         writer: None,
@@ -169,6 +176,7 @@ pub const FORMATS: &[Format] = &[
         writer: Some(CloudWriter {
             extensions: &["xyz", "txt", "csv", "asc", "pts"],
             write: text::write,
+            keeps_stations: false,
         }),
     },
     Format {
@@ -338,6 +346,22 @@ mod tests {
         }
         assert!(detected("notes.md", b"1 of 2 things: 3\n").is_err());
         assert!(detected("cloud.neu", b"\x00\x01\x02").is_err());
+    }
+
+    #[test]
+    fn ptx_and_pcd_are_known_by_their_first_lines() {
+        let ptx =
+            "2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n1 2 3 .5\n";
+        let pcd = "# written by hand\n\nVERSION .7\nFIELDS x y z\n";
+        for name in ["-", "scan.txt", "scan"] {
+            assert_eq!(detected(name, ptx.as_bytes()).unwrap(), "PTX", "{name}");
+            assert_eq!(detected(name, pcd.as_bytes()).unwrap(), "PCD", "{name}");
+            assert_eq!(detected(name, b"FIELDS x y z\nSIZE 4 4 4\n").unwrap(), "PCD", "{name}");
+            // The number of points before them is no grid, nor are three numbers a row of four.
+            assert_eq!(detected(name, b"2\n1 2 3\n4 5 6\n").unwrap(), "text", "{name}");
+            let short = ptx.replace("5 6 7 1", "5 6 7");
+            assert_ne!(detected(name, short.as_bytes()).ok(), Some("PTX"), "{name}");
+        }
     }
 
     #[test]

@@ -49,6 +49,8 @@ pub struct FileInfo {
     pub resolution: Option<DVec3>,
     /// Coordinate system, as WKT, as "EPSG:" and a code, or in the words of the file.
     pub coordinate_system: Option<String>,
+    /// True if the format prescribes metres, whatever the coordinate system: E57, PTX and glTF.
+    pub is_in_metres: bool,
     /// Properties of a LAS file that a file made from its points keeps.
     pub las: Option<LasProfile>,
     /// Names of the columns in the file.

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::Result;
 use crate::file::{check_output_path, extension, unsupported_extension};
@@ -29,6 +30,16 @@ pub fn save(
     progress.check()?;
     let writer = find_writer(path)?;
     check_output_path(path)?;
+    if !writer.keeps_stations && !cloud.stations.is_empty() {
+        let keeping = writers().filter(|writer| writer.keeps_stations);
+        let keeping = list_extensions(keeping.flat_map(|writer| writer.extensions), "and");
+        let stations = counted(cloud.stations.len(), "station");
+        let line = format!(
+            "{}: name and pose of {stations} are lost; files that keep them: {keeping}",
+            path.display()
+        );
+        progress.warning(&line, &[]);
+    }
     (writer.write)(path, cloud, options, progress)
 }
 

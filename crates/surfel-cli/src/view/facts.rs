@@ -16,8 +16,12 @@ use surfel_formats::{FileInfo, common_file_info};
 /// Columns of a cloud as `--color` takes them.
 pub fn columns(cloud: &PointCloud) -> Vec<&str> {
     let is_column = |source: &ColorSource| !source.is_computed() && source.is_available_in(cloud);
-    let usual = ColorSource::names_where(is_column).into_iter();
-    usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
+    let mut names = ColorSource::names_where(is_column);
+    let scalars = cloud.scalars.iter().map(|scalar| scalar.name.as_str());
+    // A column `class` of labels is among the usual names.
+    let others: Vec<&str> = scalars.filter(|name| !names.contains(name)).collect();
+    names.extend(others);
+    names
 }
 
 /// The symbol of the unit of lengths, if the coordinate system tells it.

@@ -1,13 +1,11 @@
 //! Histograms of columns, as the page shows them.
 
 use serde_json::{Value, json};
+use surfel_core::image::is_data;
 use surfel_core::points::{PointCloud, visit_column};
 
 /// Maximum number of ranges.
 const MAX_BINS: usize = 64;
-
-/// Greatest value that counts: larger ones stand for no data, and the width of their range would be infinite.
-const MAX_VALUE: f64 = 1e300;
 
 /// Returns the least and greatest value of a column of clouds, and the numbers of points in ranges of equal width
 /// between them. Whole numbers have ranges of whole width. Clouds without the column are left out. The memory that this
@@ -49,7 +47,7 @@ fn visit_values(
     let mut missing = None;
     for cloud in clouds {
         let visit_block = |values: &[f64]| {
-            values.iter().filter(|value| value.abs() < MAX_VALUE).for_each(|value| visit(*value));
+            values.iter().filter(|value| is_data(**value)).for_each(|value| visit(*value));
         };
         if let Err(error) = visit_column(cloud, column, visit_block) {
             missing = Some(error);

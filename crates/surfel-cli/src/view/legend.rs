@@ -18,6 +18,13 @@ pub fn legend_json(legend: &Legend) -> Value {
             let entries: Vec<Value> = entries.collect();
             json!({ "kind": "classes", "title": "class", "entries": entries })
         }
+        Legend::Labels { title, entries } => {
+            let entries = entries
+                .iter()
+                .map(|(label, color)| json!({ "name": label.to_string(), "color": hex(*color) }));
+            let entries: Vec<Value> = entries.collect();
+            json!({ "kind": "classes", "title": title, "entries": entries })
+        }
     }
 }
 

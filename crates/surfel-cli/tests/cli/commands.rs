@@ -269,6 +269,10 @@ fn info_counts_classes_and_returns_and_sums_up_headers() {
     assert!((0.3..1.2).contains(&density), "{density}");
     let table = succeed(&["info", &las]);
     assert!(table.contains("5 high vegetation") && table.contains("50.0 %"), "{table}");
+    assert!(
+        table.contains("unit          unknown") && table.contains(" points a square unit seen")
+    );
+    assert_eq!(info["unit"], "unknown");
 
     // The greatest number stands for a missing value.
     let heights = format!("x,y,z,height\n0,0,0,3\n1,0,0,{}\n0,1,0,5\n", f64::MAX);
@@ -287,6 +291,36 @@ fn info_counts_classes_and_returns_and_sums_up_headers() {
 }
 
 #[test]
+fn info_states_units_and_the_grids_of_stations() {
+    let folder = Folder::new();
+    // A quarter turn about z.
+    let header = "2\n3\n5 6 7\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n5 6 7 1\n";
+    let cells: String = (0..6).map(|i| format!("{} {} 1 0.5\n", 1 + i % 3, i / 3)).collect();
+    let scan = folder.write("scan.ptx", [header, &cells].concat());
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &scan])).unwrap();
+    assert_eq!(info["unit"], "metre");
+    let station = &info["stations"][0];
+    assert_eq!((&station["rows"], &station["columns"]), (&json!(3), &json!(2)));
+    let half = 0.5_f64.sqrt();
+    for (i, expected) in [0.0, 0.0, half, half].into_iter().enumerate() {
+        assert!((station["rotation"][i].as_f64().unwrap() - expected).abs() < 1e-9, "{station}");
+    }
+    let table = succeed(&["info", &scan]);
+    assert!(
+        table.contains(", 3 rows and 2 columns") && table.contains("rotation x y z w 0, 0, 0.7")
+    );
+    assert!(table.contains(" points a square metre seen from above"), "{table}");
+    // PLY keeps the station, LAS says that it does not.
+    let [ply, las] = ["scan.ply", "scan.las"].map(|name| folder.path(name));
+    let kept = stderr(&surfel(&["prepare", &scan, "-o", &ply]));
+    assert!(!kept.contains("are lost"), "{kept}");
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &ply])).unwrap();
+    assert_eq!(info["stations"][0], *station);
+    let lost = stderr(&surfel(&["prepare", &scan, "-o", &las]));
+    assert!(lost.contains("name and pose of 1 station are lost"), "{lost}");
+}
+
+#[test]
 fn info_and_prepare_accept_meshes() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(2.0, 1.0, [10, 20, 30]));
@@ -297,7 +331,12 @@ fn info_and_prepare_accept_meshes() {
     succeed(&["prepare", &mesh, "-o", &prepared]);
     let info: Value = serde_json::from_str(&succeed(&["info", "--json", &prepared])).unwrap();
     assert_eq!((&info["points"], &info["triangles"]), (&4.into(), &Value::Null));
-    assert!(info["columns"].get("normal").is_some() && info["columns"].get("rgb").is_some());
+    // The names are those that filters take.
+    let columns = info["columns"].as_object().unwrap().keys();
+    let filter: Vec<String> = columns.map(|name| format!("{name} < 1e9")).collect();
+    assert!(filter.contains(&"nz < 1e9".into()) && filter.contains(&"blue < 1e9".into()));
+    let kept = folder.path("kept.ply");
+    succeed(&["prepare", &prepared, "-o", &kept, "--filter", &filter.join(" && ")]);
 }
 
 #[test]

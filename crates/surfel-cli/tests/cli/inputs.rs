@@ -41,7 +41,7 @@ fn info_and_prepare_read_standard_input() {
     let prepared = folder.path("out.ply");
     let output = pipe(&["prepare", "-", "-o", &prepared], square(9, 5).as_bytes());
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(succeed(&["info", &prepared]).contains("normal"));
+    assert!(succeed(&["info", &prepared]).contains("nz"));
 }
 
 #[test]

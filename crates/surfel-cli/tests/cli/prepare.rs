@@ -24,8 +24,8 @@ fn prepare_adds_the_requested_columns_or_all() {
         succeed(&[&["prepare", &cloud, "-o", &prepared], options].concat());
         let info: Value = serde_json::from_str(&succeed(&["info", "--json", &prepared])).unwrap();
         let has = |name: &str| info["columns"].get(name).is_some();
-        assert!(has("rgb") && has("class") && has("rain"));
-        let columns = [has("normal"), has("radius"), has("surface_variation")];
+        assert!(has("red") && has("classification") && has("rain"));
+        let columns = [has("nx"), has("radius"), has("surface_variation")];
         (info["points"].as_u64().unwrap(), columns)
     };
     assert_eq!(columns(&[]), (900, [true, true, false]));

@@ -2,12 +2,14 @@
 
 pub mod colormap;
 mod classification;
+mod label_color;
 mod percentile_range;
 mod srgb;
 
 pub use classification::{class_color, class_name};
 pub use colormap::Colormap;
-pub use percentile_range::PercentileRange;
+pub use label_color::label_color;
+pub use percentile_range::{PercentileRange, is_data};
 pub use srgb::{
     decode_srgb, decode_srgb8, encode_srgb, encode_srgb8, encode_srgba8, unpremultiply,
 };

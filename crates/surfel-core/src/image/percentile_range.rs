@@ -11,11 +11,17 @@ pub struct PercentileRange {
     pub high: f64,
 }
 
+/// Returns true for a number that a column states; false for NaN and from `f32::MAX` on, which programs write where a
+/// value is missing.
+pub fn is_data(value: f64) -> bool {
+    value.abs() < f64::from(f32::MAX)
+}
+
 impl PercentileRange {
     /// The percentiles that survey programs use: the middle 96 % of the values.
     pub const DEFAULT_PERCENTILES: (f64, f64) = (2.0, 98.0);
 
-    /// Returns the range between two percentiles of the finite values, or none if there are none.
+    /// Returns the range between two percentiles of the values that are data ([`is_data`]), or none if there are none.
     ///
     /// The result is exact up to 100,000 values. Of more values, it uses a reproducible random one of each of 100,000
     /// equal runs.
@@ -25,7 +31,7 @@ impl PercentileRange {
         (low, high): (f64, f64),
     ) -> Option<Self> {
         let mut sample: Vec<f64> =
-            sample_indices(n_values).map(value_at).filter(|value| value.is_finite()).collect();
+            sample_indices(n_values).map(value_at).filter(|value| is_data(*value)).collect();
         sample.sort_unstable_by(f64::total_cmp);
         Some(Self { low: percentile(&sample, low)?, high: percentile(&sample, high)? })
     }
@@ -83,8 +89,8 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_not_finite_are_ignored() {
-        let values = [f64::NAN, 5.0, f64::INFINITY, 5.0];
+    fn values_that_are_no_data_are_ignored() {
+        let values = [f64::NAN, 5.0, f64::INFINITY, 5.0, f64::MAX, f64::from(f32::MIN)];
         assert_eq!(range(&values), Some(PercentileRange { low: 5.0, high: 5.0 }));
         assert_eq!(range(&[f64::NAN]), None);
         assert_eq!(range(&[]), None);

@@ -113,7 +113,8 @@ pub(super) fn salvage_document(
         let found = format!("no description of the scans, and no points without it ({reason})");
         let location = Location::Byte(header.xml_start);
         let expected = "the XML that describes the scans";
-        return Err(input.malformed(location, found, expected, ADVICE));
+        let advice = format!("nothing can be salvaged without it; {ADVICE}");
+        return Err(input.malformed(location, found, expected, advice));
     }
     note(&format!(
         "the description of the scans is missing; the first three fields of {} are taken for positions about \

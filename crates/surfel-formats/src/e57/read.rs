@@ -55,7 +55,9 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let mut salvage = Salvage::new(input, options.salvage);
-    let header = read_header(&mut salvage)?;
+    // Advice to salvage holds only if there is something to be salvaged.
+    let header =
+        read_header(&mut salvage).map_err(|error| inspect(input).err().unwrap_or(error))?;
     let pages = Pages::new(&input[..header.length]);
     let broken = pages.find_broken(progress)?;
     if let Some(page) = broken.first() {
@@ -254,6 +256,7 @@ fn file_info(
     let names = columns.iter().map(|(role, _)| role.name().to_owned());
     FileInfo {
         format: format!("E57 1.0, {scans}"),
+        is_in_metres: true,
         n_points: Some(document.scans.iter().fold(0, |sum, scan| sum.saturating_add(scan.records))),
         bounds: bounds.and_then(|boxes| boxes.into_iter().reduce(union)),
         coordinate_system: document.coordinate_system.clone(),

@@ -49,6 +49,16 @@ pub(super) fn scan_name(index: usize, description: &PointCloud) -> String {
     name.unwrap_or_else(|| format!("scan {}", index + 1))
 }
 
+/// Returns the numbers of rows and columns of a scan's grid, if its description states them.
+fn stated_grid(description: &PointCloud) -> Option<[u64; 2]> {
+    let bounds = description.index_bounds.as_ref()?;
+    let count = |min: Option<i64>, max: Option<i64>| {
+        let last = max?.checked_sub(min.unwrap_or(0))?;
+        u64::try_from(last).ok()?.checked_add(1)
+    };
+    Some([count(bounds.row_min, bounds.row_max)?, count(bounds.column_min, bounds.column_max)?])
+}
+
 /// Returns the bounds of two boxes together.
 pub(super) fn union([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [DVec3; 2] {
     [a.min(c), b.max(d)]
@@ -115,6 +125,7 @@ impl Scan {
             name: scan_name(index, description),
             position: is_known.then_some(self.translation),
             rotation: self.rotation,
+            grid: description.has_row_column().then(|| stated_grid(description)).flatten(),
         }
     }
 

@@ -27,6 +27,7 @@ pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     }
     Ok(FileInfo {
         format: container.format_name(),
+        is_in_metres: true,
         n_points: (0 < n_points).then_some(n_points),
         n_triangles: (0 < n_triangles).then_some(n_triangles),
         ..FileInfo::default()

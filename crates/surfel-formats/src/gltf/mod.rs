@@ -100,6 +100,7 @@ pub(crate) fn read(
     let (n_points, n_triangles) = graph.n_points_and_triangles();
     let info = FileInfo {
         format: container.format_name(),
+        is_in_metres: true,
         external_files: resolver.into_requested(),
         n_points: (0 < n_points).then_some(n_points as u64),
         n_triangles: (0 < n_triangles).then_some(n_triangles as u64),

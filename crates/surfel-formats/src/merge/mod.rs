@@ -63,6 +63,7 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
             .reduce(|a, b| Some(a?.min(b?)))
             .flatten(),
         coordinate_system: first.coordinate_system.clone().filter(|_| same_system),
+        is_in_metres: infos.iter().all(|info| info.is_in_metres),
         las: common_las_profile(infos, same_system),
         columns: first
             .columns

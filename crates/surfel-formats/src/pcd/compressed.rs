@@ -36,7 +36,10 @@ pub(super) fn records(
     let (values, fault) = decompress(&data[..data.len().min(n_compressed)], n_bytes);
     let n_readable = n_readable(header, n_points, values.len());
     if fault.is_some() || data.len() < n_compressed {
-        let found_points = format!("{n_readable} of {} are whole", counted(n_points, "point"));
+        let found_points = match n_readable == n_points {
+            true => "all positions, but within the other values".to_owned(),
+            false => format!("{n_readable} of {}", counted(n_points, "position")),
+        };
         let error = match fault {
             Some(fault) if n_compressed <= data.len() => {
                 let location = Location::Byte((header.body + 8 + fault.byte) as u64);
@@ -44,7 +47,7 @@ pub(super) fn records(
                 input.malformed(location, fault.found, expected, ADVICE)
             }
             _ => {
-                let found = format!("the end of the file, so that {found_points}");
+                let found = format!("the end of the file after {found_points}");
                 let expected = format!(
                     "{n_compressed} compressed bytes, which hold all values of a field before those of the next"
                 );

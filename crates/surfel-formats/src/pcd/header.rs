@@ -3,6 +3,7 @@
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::table::{MAX_FIELDS, NumberType};
+use surfel_core::math::{DQuat, DVec3};
 use surfel_core::words::counted;
 
 /// Maximum bytes of a header: names of a thousand fields take a tenth of it.
@@ -18,14 +19,22 @@ pub(super) struct Header {
     pub width: u64,
     /// Number of rows of an organised cloud, else 1.
     pub height: u64,
-    /// Position of the sensor in the coordinates of the points.
-    pub viewpoint: [f64; 3],
+    /// Pose of the sensor in the coordinates of the points.
+    pub viewpoint: Viewpoint,
     /// Encoding of the points.
     pub encoding: Encoding,
     /// First byte after the header.
     pub body: usize,
     /// Number of the line that begins there.
     pub body_line: u64,
+}
+
+/// The pose of a sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Viewpoint {
+    pub position: DVec3,
+    /// Rotation from the sensor's axes to those of the points.
+    pub rotation: DQuat,
 }
 
 /// The encoding of the points after the header.
@@ -93,8 +102,20 @@ struct Entries {
     counts: Option<Vec<usize>>,
     width: Option<u64>,
     height: Option<u64>,
-    viewpoint: Option<[f64; 3]>,
+    viewpoint: Option<Viewpoint>,
     points: Option<u64>,
+}
+
+/// Returns true if an input begins with the comment that programs write first, or with a key of the header after
+/// comments.
+pub(crate) fn is_pcd(input: &Input) -> bool {
+    /// Number of first bytes among which the key is.
+    const MAX_LENGTH: usize = 4096;
+    let start = &input[..input.len().min(MAX_LENGTH)];
+    let lines = start.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let first = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#"));
+    let is_key = |line: &[u8]| line.starts_with(b"VERSION ") || line.starts_with(b"FIELDS ");
+    start.starts_with(b"# .PCD") || first.is_some_and(is_key)
 }
 
 /// Reads the header at the start of `input`.
@@ -176,11 +197,11 @@ impl Entries {
             "WIDTH" => self.width = Some(one.parse().map_err(|_| "the points of a row")?),
             "HEIGHT" => self.height = Some(one.parse().map_err(|_| "the number of rows")?),
             "POINTS" => self.points = Some(one.parse().map_err(|_| "the number of points")?),
-            // Its rotation is not needed, and a viewpoint that is none is as good as no line.
+            // A viewpoint that is none is as good as no line.
             "VIEWPOINT" => {
                 let numbers = words.map_while(|word| word.parse::<f64>().ok());
                 let numbers: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
-                self.viewpoint = numbers.first_chunk().copied();
+                self.viewpoint = viewpoint(&numbers);
             }
             _ => {
                 return Err(
@@ -242,6 +263,18 @@ impl Entries {
         }
         Ok((width, height))
     }
+}
+
+/// Returns the pose of a position and a quaternion w, x, y, z, which may be missing.
+fn viewpoint(numbers: &[f64]) -> Option<Viewpoint> {
+    let (position, rest) = numbers.split_first_chunk()?;
+    let rotation = rest.first_chunk().and_then(|&[w, x, y, z]| {
+        let rotation = DQuat::from_xyzw(x, y, z, w);
+        let length = rotation.length();
+        (0.0 < length && length.is_finite()).then(|| rotation.normalize())
+    });
+    let position = DVec3::from_array(*position);
+    Some(Viewpoint { position, rotation: rotation.unwrap_or_default() })
 }
 
 fn numbers<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Vec<usize>> {

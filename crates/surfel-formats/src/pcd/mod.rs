@@ -5,4 +5,5 @@ mod lzf;
 mod compressed;
 mod read;
 
+pub(crate) use header::is_pcd;
 pub(crate) use read::{inspect, read};

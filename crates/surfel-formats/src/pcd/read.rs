@@ -3,12 +3,11 @@
 use std::borrow::Cow;
 use surfel_core::words::counted;
 
-use surfel_core::math::DVec3;
 use surfel_core::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, Scalar, ScanStation, Values};
 use surfel_core::progress::Progress;
 
 use super::compressed;
-use super::header::{Encoding, Header, PcdField, read_header};
+use super::header::{Encoding, Header, PcdField, Viewpoint, read_header};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -43,20 +42,34 @@ pub(crate) fn read(
         _ => read_binary(&mut salvage, &header, options, progress)?,
     };
     salvage.report("point", n_points, Some(header.n_points()), progress)?;
+    add_station(&mut cloud, &header);
     if header.is_organized() {
         add_grid(&mut cloud, &header, options);
     }
     Ok(Loaded { cloud, info: FileInfo { n_points: Some(n_points), ..file_info(&header) } })
 }
 
-/// Adds the station of an organised cloud, and the row and column of each point. A cloud without the points that a
-/// filter dropped is no grid any more.
-fn add_grid(cloud: &mut PointCloud, header: &Header, options: &LoadOptions) {
-    let position = Some(DVec3::from_array(header.viewpoint));
-    let station = ScanStation { name: "scan 1".into(), position, ..ScanStation::default() };
+/// Adds the station of a cloud that was measured from the viewpoint. Without a grid, the viewpoint that all programs
+/// write by default tells none.
+fn add_station(cloud: &mut PointCloud, header: &Header) {
+    let is_organized = header.is_organized();
+    if !is_organized && header.viewpoint == Viewpoint::default() {
+        return;
+    }
+    let station = ScanStation {
+        name: "scan 1".into(),
+        position: Some(header.viewpoint.position),
+        rotation: header.viewpoint.rotation,
+        grid: is_organized.then_some([header.height, header.width]),
+    };
     let n_points = cloud.len();
     set_stations(cloud, vec![station], &[n_points]);
-    if n_points as u64 != header.n_points() {
+}
+
+/// Adds the row and column of each point of an organised cloud. A cloud without the points that a filter dropped is no
+/// grid any more.
+fn add_grid(cloud: &mut PointCloud, header: &Header, options: &LoadOptions) {
+    if cloud.len() as u64 != header.n_points() {
         return;
     }
     let cells = 0..header.n_points();

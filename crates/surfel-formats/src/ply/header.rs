@@ -1,8 +1,11 @@
 //! The header of a PLY file: elements and their properties.
 
+use super::station_comment::parse_station;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
+use crate::stations::MAX_STATIONS;
 use crate::table::{MAX_FIELDS, MAX_LINE_LENGTH, NumberType};
+use surfel_core::points::ScanStation;
 use surfel_core::words::counted;
 
 /// The header of a file.
@@ -13,6 +16,8 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
     /// Names of texture files, which MeshLab writes in comments.
     pub textures: Vec<String>,
+    /// Stations of the points, which surfel writes in comments.
+    pub stations: Vec<ScanStation>,
     /// First byte after the header.
     pub body: usize,
     /// Number of the line that begins there.
@@ -78,6 +83,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     let mut lines = Lines::new(input);
     let mut encoding = None;
     let mut textures = Vec::new();
+    let mut stations = Vec::new();
     let mut elements: Vec<Element> = Vec::new();
     loop {
         let number = lines.number;
@@ -98,6 +104,9 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
             ["comment", "TextureFile", ..] => {
                 let name = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
                 textures.extend(name);
+            }
+            ["comment", "station", ..] if stations.len() < MAX_STATIONS => {
+                stations.extend(parse_station(&words));
             }
             ["ply"] | ["comment" | "obj_info", ..] | [] => {}
             ["format", name, _version] => {
@@ -132,7 +141,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                     return Err(malformed(&line, "a `format` line before it"));
                 };
                 let (body, body_line) = (lines.at, lines.number);
-                return Ok(Header { encoding, elements, textures, body, body_line });
+                return Ok(Header { encoding, elements, textures, stations, body, body_line });
             }
             _ => {
                 return Err(malformed(

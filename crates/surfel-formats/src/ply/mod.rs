@@ -1,5 +1,6 @@
 //! PLY: polygon files, read as points (their vertices) or as meshes.
 
+mod station_comment;
 mod header;
 mod skip;
 mod element_lines;

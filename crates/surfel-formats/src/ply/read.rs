@@ -1,6 +1,6 @@
 //! Reads the vertices of PLY files: binary ones in place, ascii ones by lines.
 
-use surfel_core::points::{GAUSSIAN_COLUMNS, PointCloud};
+use surfel_core::points::{GAUSSIAN_COLUMNS, PointCloud, STATION};
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 
@@ -42,8 +42,12 @@ pub(crate) fn read(
         if let Some(line) = incomplete_splats(vertex) {
             progress.note(&format!("{}: {line}", input.name));
         }
-        let (cloud, n_points) = read_cloud(&mut salvage, &header, options, progress)?;
+        let stations = if header.stations.is_empty() { vec![] } else { vec![STATION] };
+        let columns = options.columns.with_names(&stations);
+        let needed = LoadOptions { columns, ..options.clone() };
+        let (mut cloud, n_points) = read_cloud(&mut salvage, &header, &needed, progress)?;
         salvage.report("point", n_points, info.n_points.replace(n_points), progress)?;
+        cloud.stations = header.stations;
         return Ok(Loaded { cloud, info });
     }
     let columns = options.columns.with_names(&GAUSSIAN_COLUMNS);

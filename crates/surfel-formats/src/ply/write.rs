@@ -8,6 +8,7 @@ use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, Values, to_8_bits};
 use surfel_core::progress::Progress;
 
+use super::station_comment::format_station;
 use crate::error::Result;
 use crate::file::{write_error, write_file};
 use crate::table::{encode_points, note_rounded_colors, scalar_word};
@@ -33,6 +34,7 @@ pub(crate) fn write(path: &Path, cloud: &PointCloud, progress: &dyn Progress) ->
 fn header(cloud: &PointCloud, has_wide_positions: bool) -> String {
     let mut header =
         String::from("ply\nformat binary_little_endian 1.0\ncomment written by surfel\n");
+    cloud.stations.iter().for_each(|station| header += &(format_station(station) + "\n"));
     header += &format!("element vertex {}\n", cloud.len());
     let mut property =
         |type_name: &str, name: &str| header += &format!("property {type_name} {name}\n");

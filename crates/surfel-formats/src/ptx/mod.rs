@@ -4,3 +4,4 @@ mod scans;
 mod read;
 
 pub(crate) use read::{inspect, read};
+pub(crate) use scans::is_ptx;

@@ -24,6 +24,7 @@ pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let scan = first_header(input)?;
     Ok(FileInfo {
         format: format!("PTX, {} x {} grid", scan.grid[0], scan.grid[1]),
+        is_in_metres: true,
         ..FileInfo::default()
     })
 }
@@ -84,10 +85,12 @@ pub(crate) fn read(
         name: format!("scan {}", i + 1),
         position: Some(scan.position),
         rotation: rotation_of(&scan.rotation),
+        grid: Some([scan.grid[1], scan.grid[0]]),
     });
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
     let info = FileInfo {
         format: format!("PTX, {}", describe(&scans)),
+        is_in_metres: true,
         n_points: Some(n_points),
         columns: roles.iter().map(|role| role.name().to_owned()).collect(),
         ..FileInfo::default()

@@ -98,6 +98,11 @@ pub(super) fn find_scans(salvage: &mut Salvage, progress: &dyn Progress) -> Resu
     }
 }
 
+/// Returns true if an input begins with the lines before a scan.
+pub(crate) fn is_ptx(input: &Input) -> bool {
+    first_header(input).is_ok()
+}
+
 /// Reads the header of the first scan.
 pub(super) fn first_header(input: &Input) -> Result<Scan> {
     read_scan_header(&mut Lines { input, at: 0, number: 0 })

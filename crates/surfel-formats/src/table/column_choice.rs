@@ -58,14 +58,18 @@ impl ColumnChoice {
     /// Returns the choice of these columns and of those with these names.
     pub(crate) fn with_names(&self, names: &[&str]) -> Self {
         let Self::Only(columns) = self else { return Self::All };
-        let named = names.iter().filter_map(|name| match ColumnRole::from_name(name) {
-            Some(ColumnRole::Position(_)) => None,
-            Some(ColumnRole::Normal(_)) => Some(Column::Normals),
-            Some(ColumnRole::Color(_)) => Some(Column::Colors),
-            Some(ColumnRole::Radius) => Some(Column::Radii),
-            Some(ColumnRole::Intensity) => Some(Column::Intensity),
-            Some(ColumnRole::Classification) => Some(Column::Classification),
-            Some(ColumnRole::Scalar(_)) | None => Some(Column::Scalar((*name).to_owned())),
+        let named = names.iter().flat_map(|name| {
+            let scalar = Column::Scalar((*name).to_owned());
+            match ColumnRole::from_name(name) {
+                Some(ColumnRole::Position(_)) => vec![],
+                Some(ColumnRole::Normal(_)) => vec![Column::Normals],
+                Some(ColumnRole::Color(_)) => vec![Column::Colors],
+                Some(ColumnRole::Radius) => vec![Column::Radii],
+                Some(ColumnRole::Intensity) => vec![Column::Intensity],
+                // A column of this name may hold labels instead.
+                Some(ColumnRole::Classification) => vec![Column::Classification, scalar],
+                Some(ColumnRole::Scalar(_)) | None => vec![scalar],
+            }
         });
         Self::Only(columns.iter().cloned().chain(named).collect())
     }

@@ -106,8 +106,8 @@ mod tests {
         ];
         assert_eq!(ColumnRole::from_names(&names), expected);
         assert_eq!(
-            ColumnRole::from_names(&["label", "class"]),
-            [ColumnRole::Classification, scalar("class")]
+            ColumnRole::from_names(&["class", "classification", "label"]),
+            [scalar("class"), ColumnRole::Classification, scalar("label")]
         );
     }
 }

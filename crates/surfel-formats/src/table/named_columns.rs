@@ -1,5 +1,7 @@
 //! Columns of binary and ascii records whose fields have names.
 
+use surfel_core::points::plain_name;
+
 use super::color_range::{ColorRange, is_byte};
 use super::column_choice::ColumnChoice;
 use super::column_role::ColumnRole;
@@ -7,8 +9,8 @@ use super::layout::{ColumnField, Field, NumberType};
 
 /// Returns columns with roles by their names, and with the scale of colours. Each field has a name.
 ///
-/// The range of floating-point colours also depends on the values in `sample`, the first records. A column holds
-/// classes if all values in `sample` can be classes, and all in `records`, which may be more, can be classes or are
+/// The range of floating-point colours also depends on the values in `sample`, the first records. A column named
+/// `classification` holds classes if all values in `sample` can be classes, and all in `records`, which may be more, can be classes or are
 /// missing. Opacity is left out unless `choice` names it.
 pub(crate) fn named_columns<'a>(
     fields: impl Iterator<Item = (&'a str, Field)>,
@@ -45,7 +47,10 @@ pub(crate) fn named_columns<'a>(
             sample.all(|record| is_byte(field.value(record, big_endian)))
                 && field.holds_classes(records, stride, big_endian)
         };
-        if role == ColumnRole::Classification && number_type != NumberType::U8 && !holds_classes() {
+        // A column `class` of such files holds labels, of which 7 is not noise.
+        let holds_asprs_classes =
+            || plain_name(name).ends_with("classification") && holds_classes();
+        if role == ColumnRole::Classification && !holds_asprs_classes() {
             role = ColumnRole::Scalar(name.into());
         }
         let range = match number_type {

@@ -55,7 +55,18 @@ pub(crate) fn read(
     let mut columns = match (&options.text_columns, &preamble.names) {
         (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
         (None, Some(names)) => roles_of_header(names),
-        (None, None) if preamble.has_text => return Err(unnamed_text(input, &preamble)),
+        (None, None) if preamble.has_text => {
+            let Some(columns) = survey_columns(&sample.is_text) else {
+                return Err(unnamed_text(input, &preamble));
+            };
+            let line = format!(
+                "{}: no header; columns taken as name of the point, x y z, code; {} if the northing comes first",
+                input.name,
+                possible_columns(first_line(input, &preamble), &preamble, ["y", "x", "z"])
+            );
+            progress.choice(&line, &["columns"]);
+            columns
+        }
         (None, None) => {
             let is_pts = preamble.count.is_some() || input.name.to_lowercase().ends_with(".pts");
             let (columns, description) = infer_columns(&sample.rows, preamble.n_fields, is_pts);
@@ -117,10 +128,26 @@ fn roles_of_header(names: &[String]) -> Vec<Option<ColumnRole>> {
     roles.map(|(role, name)| (!ColumnRole::is_alpha(name)).then_some(role)).collect()
 }
 
+/// Returns the columns of a survey's list without a header: the name of a point, three coordinates, and a code or several;
+/// `None` if texts stand elsewhere.
+fn survey_columns(is_text: &[bool]) -> Option<Vec<Option<ColumnRole>>> {
+    let ([true, false, false, false], [true, codes @ ..]) = is_text.split_first_chunk()? else {
+        return None;
+    };
+    let axes = (0..3).map(|axis| Some(ColumnRole::Position(axis)));
+    let columns = [None].into_iter().chain(axes).chain(vec![None; 1 + codes.len()]);
+    codes.iter().all(|is_text| *is_text).then(|| columns.collect())
+}
+
+/// Returns the first line of points.
+fn first_line<'a>(input: &'a Input, preamble: &Preamble) -> &'a [u8] {
+    let lines = input[preamble.data..].split(|byte| *byte == b'\n');
+    lines.map(<[u8]>::trim_ascii).next().unwrap_or_default()
+}
+
 /// Returns the error of lines that hold text besides numbers, of which nothing tells the coordinates.
 fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
-    let line = input[preamble.data..].split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let line = line.trim_ascii();
+    let line = first_line(input, preamble);
     let [easting_first, northing_first] = [["x", "y", "z"], ["y", "x", "z"]]
         .map(|coordinates| possible_columns(line, preamble, coordinates));
     let advice = format!(

@@ -211,7 +211,7 @@ fn the_rays_of_a_grid_tell_the_station_of_a_scan_without_a_pose() {
     assert_eq!(cloud.stations[0].position, Some(DVec3::ZERO));
     assert!(listener.has_note("1 scan without a pose: the rays of the grid start at 0,0,0"));
     let moved = read("a.e57", bytes_from([0.5, -0.5, 0.2])).unwrap().cloud;
-    assert_eq!(moved.stations[0].position, None);
+    assert_eq!((moved.stations[0].position, moved.stations[0].grid), (None, Some([40, 40])));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! PCD files: all encodings, packed colours, fields of any order, and broken headers.
 
-use surfel_core::math::{DVec3, Vec3};
+use surfel_core::math::{DQuat, DVec3, Vec3};
 use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, STATION, Values};
 use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, Error, LoadOptions, load, load_bytes};
@@ -82,6 +82,7 @@ fn organized_clouds_have_a_station_and_a_grid() {
     assert_eq!(cloud.scalar(ROW_INDEX), Some(&Values::U16(vec![0, 0, 0, 1, 1, 1])));
     assert_eq!(cloud.scalar(COLUMN_INDEX), Some(&Values::U16(vec![0, 1, 2, 0, 1, 2])));
     assert_eq!(cloud.station_of(3).unwrap().position, Some(DVec3::new(4.0, 5.0, 6.0)));
+    assert_eq!(cloud.station_of(3).unwrap().grid, Some([2, 3]));
     let filter = Some("x > 2".parse().unwrap());
     let options = LoadOptions { filter, ..LoadOptions::default() };
     let filtered = load_bytes("a.pcd", file.as_bytes(), &options, &NoProgress).unwrap().cloud;
@@ -89,8 +90,53 @@ fn organized_clouds_have_a_station_and_a_grid() {
     let broken = file.replace("VIEWPOINT 4 5 6 1 0 0 0", "VIEWPOINT 4 nan");
     let station = read("a.pcd", broken).unwrap().cloud.stations.pop().unwrap();
     assert_eq!(station.position, Some(DVec3::ZERO));
-    let line = file.replace("WIDTH 3\nHEIGHT 2", "WIDTH 6\nHEIGHT 1");
-    assert!(read("a.pcd", line).unwrap().cloud.stations.is_empty());
+}
+
+#[test]
+fn a_viewpoint_other_than_the_default_is_a_station() {
+    let file = |viewpoint: &str| {
+        format!(
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nVIEWPOINT {viewpoint}\nDATA ascii\n\
+             1 2 3\n4 5 6\n"
+        )
+    };
+    let stations = |viewpoint| read("a.pcd", file(viewpoint)).unwrap().cloud.stations;
+    assert!(stations("0 0 0 1 0 0 0").is_empty() && stations("none").is_empty());
+    let turned = stations("1 2 3 0 0 0 2").pop().unwrap();
+    assert_eq!(turned.position, Some(DVec3::new(1.0, 2.0, 3.0)));
+    assert_eq!((turned.rotation, turned.grid), (DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0), None));
+    assert_eq!(stations("1 2 3").pop().unwrap().rotation, DQuat::IDENTITY);
+    assert_eq!(stations("0 0 0 0.6 0.8 0 0").pop().unwrap().position, Some(DVec3::ZERO));
+}
+
+#[test]
+fn labels_of_segments_are_no_asprs_classes() {
+    let pcd = |name: &str| {
+        format!(
+            "FIELDS x y z {name}\nSIZE 4 4 4 4\nTYPE F F F U\nWIDTH 2\nHEIGHT 1\nDATA ascii\n1 2 3 7\n4 5 6 2\n"
+        )
+    };
+    let ply = |name: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+             property uint {name}\nend_header\n1 2 3 7\n4 5 6 2\n"
+        )
+    };
+    for name in ["label", "class"] {
+        for (file, content) in [("a.pcd", pcd(name)), ("a.ply", ply(name))] {
+            let cloud = read(file, content.clone()).unwrap().cloud;
+            assert_eq!(cloud.classification, None, "{file} {name}");
+            assert_eq!(cloud.scalar(name), Some(&Values::F64(vec![7.0, 2.0])), "{file} {name}");
+            let filter = Some(format!("{name} == 7").parse().unwrap());
+            let columns = ColumnChoice::Only(Vec::new());
+            let options = LoadOptions { filter, columns, ..LoadOptions::default() };
+            let kept = load_bytes(file, content.as_bytes(), &options, &NoProgress).unwrap();
+            assert_eq!(kept.cloud.len(), 1, "{file} {name}");
+        }
+    }
+    for (file, content) in [("a.pcd", pcd("classification")), ("a.ply", ply("Classification"))] {
+        assert_eq!(read(file, content).unwrap().cloud.classification, Some(vec![7, 2]), "{file}");
+    }
 }
 
 #[test]
@@ -110,7 +156,7 @@ fn all_encodings_hold_the_same_points() {
         assert_eq!(loaded.cloud.world_position(0), DVec3::new(1e6, 2.0, 3.5), "{name}");
         assert!(loaded.cloud.positions[1].z.is_nan(), "{name}");
         assert_eq!(loaded.cloud.colors, Some(vec![[65535, 0, 65535], [0, 65535, 0]]), "{name}");
-        assert_eq!(loaded.cloud.classification, Some(vec![7, 8]), "{name}");
+        assert_eq!(loaded.cloud.scalar("label"), Some(&Values::U16(vec![7, 8])), "{name}");
         assert_eq!(loaded.cloud.scalar("histogram_1"), Some(&Values::F32(vec![-1.0, 2.0])));
         assert!(loaded.cloud.scalar("_").is_none() && loaded.cloud.scalar("_0").is_none());
         assert_eq!(loaded.info.columns, ascii.info.columns, "{name}");

@@ -117,7 +117,7 @@ fn labels_above_255_after_the_first_records_are_not_clamped() {
     let header = |encoding: &str| {
         format!(
             "ply\nformat {encoding} 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n\
-            property float z\nproperty int label\nend_header\n"
+            property float z\nproperty int classification\nend_header\n"
         )
     };
     let label = |i: usize| if i + 1 == n { 300 } else { i % 7 };

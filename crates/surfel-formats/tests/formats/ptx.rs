@@ -51,6 +51,7 @@ fn points_know_their_station() {
     let turned = single.station_of(0).unwrap().rotation * DVec3::X;
     assert!(turned.distance(DVec3::Y) < 1e-12, "{turned}");
     assert_eq!(single.station_of(0).unwrap().position, Some(DVec3::ZERO));
+    assert_eq!(single.station_of(0).unwrap().grid, Some([1, 2]));
 }
 
 #[test]

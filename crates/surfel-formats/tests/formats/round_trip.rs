@@ -1,12 +1,12 @@
 //! Clouds that are written and read back within the resolution of the format.
 
-use surfel_core::math::{DVec3, Vec3};
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::math::{DQuat, DVec3, Vec3};
+use surfel_core::points::{PointCloud, STATION, Scalar, ScanStation, Values};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{Error, LoadOptions, Loaded, SaveOptions, load, load_all, save};
+use surfel_formats::{ColumnChoice, Error, LoadOptions, Loaded, SaveOptions, load, load_all, save};
 
 use crate::common::{
-    Folder, Listener, colors_in_file, full_cloud, largest_difference, round_trip, shared,
+    Folder, Listener, colors_in_file, full_cloud, largest_difference, read, round_trip, shared,
 };
 
 #[test]
@@ -40,6 +40,54 @@ fn ply_positions_round_trip_bit_exactly() {
         positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
     };
     assert_eq!(bits(&back.cloud.positions), bits(&positions));
+}
+
+#[test]
+fn stations_stay_in_ply_and_are_reported_lost_elsewhere() {
+    let station = |name: &str, position, grid| ScanStation {
+        name: name.into(),
+        position,
+        rotation: DQuat::from_xyzw(0.0, 0.6, 0.0, 0.8),
+        grid,
+    };
+    let mut cloud = full_cloud(4);
+    cloud.stations = vec![
+        station(
+            "north  wall\nof the yard",
+            Some(DVec3::new(0.1, 4_900_000.25, -3.0)),
+            Some([3, 5]),
+        ),
+        station("", None, None),
+    ];
+    let values = Values::U16(vec![0, 1, 1, 0]);
+    cloud.scalars.push(Scalar { name: STATION.into(), values });
+    let folder = Folder::new("stations");
+    let path = folder.path("a.ply");
+    let listener = Listener::default();
+    save(&path, &cloud, &SaveOptions::default(), &listener).unwrap();
+    assert!(!listener.has_note("are lost"));
+    // The stations of points are read, whatever columns are asked for.
+    let columns = ColumnChoice::Only(Vec::new());
+    let options = LoadOptions { columns, ..LoadOptions::default() };
+    for options in [LoadOptions::default(), options] {
+        let back = load(&path, &options, &NoProgress).unwrap().cloud;
+        cloud.stations[0].name = "north wall of the yard".into();
+        assert_eq!(back.stations, cloud.stations);
+        assert_eq!(back.station_of(3), Some(&cloud.stations[0]));
+    }
+    for extension in ["las", "xyz"] {
+        let listener = Listener::default();
+        let path = folder.path(&format!("a.{extension}"));
+        save(&path, &cloud, &SaveOptions::default(), &listener).unwrap();
+        assert!(listener.has_note("warning: "), "{extension}");
+        let words = format!("a.{extension}: name and pose of 2 stations are lost; files that keep");
+        assert!(listener.has_note(&words) && listener.has_note(".ply"), "{:?}", listener.notes);
+    }
+    let mut file = std::fs::read(&path).unwrap();
+    let text = b"comment station 0";
+    let at = file.windows(text.len()).position(|bytes| bytes == text).unwrap();
+    file[at + text.len() - 1] = b'x';
+    assert_eq!(read("a.ply", file).unwrap().cloud.stations.len(), 1, "other comments are ignored");
 }
 
 #[test]

@@ -256,10 +256,10 @@ fn columns_may_be_stated_for_more_fields_than_the_header_names() {
 
 #[test]
 fn text_without_a_header_needs_stated_columns() {
-    let file = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
+    let file = "20,10,3,TREE\n21,11,3,\"a, b\"\n";
     let error = read("a.csv", file).unwrap_err().to_string();
-    assert!(error.contains("line 1: found `P1,20,10,3,TREE`"), "{error}");
-    assert!(error.contains("state the columns, as in -,x,y,z,- or, if"), "{error}");
+    assert!(error.contains("line 1: found `20,10,3,TREE`"), "{error}");
+    assert!(error.contains("state the columns, as in x,y,z,- or, if"), "{error}");
     for (line, expected) in [
         ("20,10,3,TREE", ["x,y,z,-", "y,x,z,-"]),
         ("1,20,10,3,TREE", ["-,x,y,z,-", "-,y,x,z,-"]),
@@ -271,10 +271,34 @@ fn text_without_a_header_needs_stated_columns() {
             format!("as in {easting_first} or, if the northing comes first, {northing_first};");
         assert!(error.contains(&advice), "{error}");
     }
+}
+
+/// A list of a survey without a header.
+const SURVEY: &str = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
+
+#[test]
+fn lists_of_names_coordinates_and_codes_need_no_header() {
+    for file in [SURVEY, "P1;20;10;3;TREE;oak\n2;21;11;3;;\n", "P1 20 10 3 TREE\nP2 21 11 3 9\n"] {
+        let listener = Listener::default();
+        let loaded = load_bytes("a.csv", file.as_bytes(), &LoadOptions::default(), &listener);
+        let cloud = loaded.unwrap().cloud;
+        assert_eq!(cloud.positions, [Vec3::new(20.0, 10.0, 3.0), Vec3::new(21.0, 11.0, 3.0)]);
+        assert!(cloud.scalars.is_empty() && cloud.intensity.is_none());
+        let line = "columns taken as name of the point, x y z, code; -,y,x,z,-";
+        assert!(listener.has_note(line), "{:?}", listener.notes);
+    }
+    // A text among the coordinates, or a number among the codes, leaves it open what is what.
+    for file in ["P1,20,10,3,TREE,5\n", "P1,20,TREE,10,3\n", "P1,20,10,3,TREE\nP2,20,x,3,TREE\n"] {
+        assert!(read("a.csv", file).is_err(), "{file}");
+    }
+}
+
+#[test]
+fn northings_come_first_if_stated() {
     let columns = Some(TextColumn::parse_list("-,y,x,z,code"));
     let options = LoadOptions { text_columns: columns, ..LoadOptions::default() };
     let listener = Listener::default();
-    let cloud = load_bytes("a.csv", file.as_bytes(), &options, &listener).unwrap().cloud;
+    let cloud = load_bytes("a.csv", SURVEY.as_bytes(), &options, &listener).unwrap().cloud;
     assert_eq!(cloud.positions[1], Vec3::new(11.0, 21.0, 3.0));
     assert!(listener.has_note("skipped text column code"));
 }

@@ -8,6 +8,8 @@ pub use georeference::georeference;
 pub use reproject::{is_in_degrees, move_to_metres, report_degrees};
 pub use wkt::short_name;
 
+use std::fmt;
+
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;
 use surfel_core::math::DVec3;
@@ -75,6 +77,23 @@ impl Unit {
             Self::Metres(metres) if (metres - 0.3048).abs() < 1e-5 => "ft",
             Self::Metres(_) => "units",
             Self::Degrees => "°",
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    /// Writes the name of the unit in the singular, as in `US survey foot`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        /// Relative difference of numbers that mean the same unit; the feet differ by 2e-6.
+        const TOLERANCE: f64 = 2e-7;
+        let is = |metres: &f64, known: f64| (metres - known).abs() <= TOLERANCE * known;
+        match self {
+            Self::Unknown => f.write_str("unknown"),
+            Self::Degrees => f.write_str("degree"),
+            Self::Metres(metres) if is(metres, 1.0) => f.write_str("metre"),
+            Self::Metres(metres) if is(metres, 0.3048) => f.write_str("foot"),
+            Self::Metres(metres) if is(metres, 1200.0 / 3937.0) => f.write_str("US survey foot"),
+            Self::Metres(metres) => write!(f, "unit of {metres} m"),
         }
     }
 }
@@ -196,6 +215,10 @@ mod tests {
         assert_eq!(unit("epsg:2261").unwrap().symbol(), "ft");
         assert_eq!(unit("EPSG:4326"), Some(Unit::Degrees));
         assert_eq!(unit("EPSG:4326").unwrap().metres(), None);
+        let name = |text: &str| unit(text).unwrap_or_default().to_string();
+        assert_eq!(["EPSG:25832", "EPSG:4326", "grid"].map(name), ["metre", "degree", "unknown"]);
+        assert_eq!(["EPSG:2261", "EPSG:2256"].map(name), ["US survey foot", "foot"]);
+        assert_eq!(Unit::Metres(0.9144).to_string(), "unit of 0.9144 m");
         for unknown in ["", "EPSG:", "EPSG:99999", "EPSG:abc", "Local grid", "EPSG:2154+x", "é"] {
             assert_eq!(unit(unknown), None, "{unknown}");
         }

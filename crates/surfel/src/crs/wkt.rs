@@ -14,11 +14,13 @@ pub fn definition(text: &str) -> Option<(String, Option<EpsgCodes>)> {
     Some((definition, epsg_codes(text.trim())))
 }
 
-/// Returns the name of the system that a text describes, with its EPSG codes; the text itself if it is no WKT.
+/// Returns the name of the system that a text describes, or its kind if it has no name, with its EPSG codes; the text
+/// itself if it is no WKT.
 pub fn short_name(text: &str) -> String {
     let name = Node::parse(text).and_then(|root| {
-        let name = root.content.first()?.trim().strip_prefix('"')?.strip_suffix('"')?;
-        (!name.is_empty()).then(|| name.to_owned())
+        let name = root.name()?;
+        let is_name = !["", "unnamed", "unknown"].contains(&name.to_lowercase().trim());
+        if is_name { Some(name.to_owned()) } else { root.kind() }
     });
     match (name, epsg_codes(text.trim())) {
         (Some(name), Some(codes)) => {
@@ -68,6 +70,29 @@ impl<'a> Node<'a> {
         let (keyword, rest) = text.trim().split_once(['[', '('])?;
         let content = split(rest.strip_suffix([']', ')'])?);
         Some(Self { keyword: keyword.trim(), content })
+    }
+
+    /// Returns the quoted text that stands first.
+    fn name(&self) -> Option<&'a str> {
+        self.content.first()?.trim().strip_prefix('"')?.strip_suffix('"')
+    }
+
+    /// Returns a system without a name in words.
+    fn kind(&self) -> Option<String> {
+        let keyword = self.keyword.to_ascii_uppercase();
+        let kind = match keyword.as_str() {
+            "PROJCS" | "PROJCRS" => "projected",
+            "GEOGCS" | "GEOGCRS" => "geographic",
+            "GEOCCS" => "geocentric",
+            "GEODCRS" => "geodetic",
+            "LOCAL_CS" | "ENGCRS" => "local",
+            "COMPD_CS" | "COMPOUNDCRS" => "compound",
+            _ => return None,
+        };
+        let projection = self.nodes().find(|node| node.keyword.eq_ignore_ascii_case("PROJECTION"));
+        let projection = projection.and_then(|node| node.name()).map(|name| name.replace('_', " "));
+        let words = projection.map_or_else(String::new, |projection| format!(", {projection}"));
+        Some(format!("a {kind} system without a name{words}"))
     }
 
     fn nodes(&self) -> impl Iterator<Item = Node<'a>> {
@@ -142,7 +167,10 @@ mod tests {
         assert_eq!(short_name(UTM), "NAD83 / UTM zone 12N, metres (EPSG:26912)");
         assert_eq!(short_name("LOCAL_CS[\"site\",UNIT[\"metre\",1]]"), "site");
         assert_eq!(short_name("EPSG:2154+5720"), "EPSG:2154+5720");
-        assert_eq!(short_name("GEOGCS[\"\"]"), "GEOGCS[\"\"]");
+        assert_eq!(short_name("GEOGCS[\"\"]"), "a geographic system without a name");
+        let unnamed = UTM.replace("NAD83 / UTM zone 12N, metres", "unnamed");
+        let expected = "a projected system without a name, Transverse Mercator (EPSG:26912)";
+        assert_eq!(short_name(&unnamed), expected);
     }
 
     #[test]

@@ -60,8 +60,8 @@ settings! {
         azimuth_angle: f64 = 0.0, number(-360.0, 360.0), "DEG", common;
         /// Height of the chosen camera above the horizon in degrees.
         elevation_angle: f64, number(-90.0, 90.0), "DEG";
-        /// Stands where the scanner of this scan stood, and looks along the longest view: a station of an E57, PTX or
-        /// organised PCD file, as surfel info lists them.
+        /// Stands where the scanner of this scan stood, and looks along the longest view: a station of an E57, PTX,
+        /// PCD or PLY file, as surfel info lists them.
         station: String, Text, "NAME";
         /// Moves the chosen camera nearer (above 1) or farther away.
         zoom_factor: f64 = 1.0, POSITIVE, "FACTOR";

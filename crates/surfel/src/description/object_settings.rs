@@ -299,7 +299,9 @@ impl ObjectSettings {
             None => columns.extend([Column::Colors, Column::Intensity]),
             Some(ColorSource::Rgb) => columns.push(Column::Colors),
             Some(ColorSource::Intensity) => columns.push(Column::Intensity),
-            Some(ColorSource::Class) => columns.push(Column::Classification),
+            Some(ColorSource::Class) => {
+                columns.extend([Column::Classification, Column::Scalar("class".to_owned())]);
+            }
             Some(ColorSource::Column(name)) => columns.push(Column::Scalar(name.clone())),
             Some(
                 ColorSource::Elevation

@@ -17,7 +17,7 @@ const PADDING: f32 = 0.6;
 /// The content of a legend.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum LegendBlock {
-    /// The name and colour of each class.
+    /// The name and colour of each class or label.
     Classes(Vec<(String, [u8; 3])>),
     /// A colour bar.
     Bar {
@@ -40,6 +40,11 @@ impl LegendBlock {
                     "reserved" | "user definable" => (format!("{name} ({class})"), color),
                     name => (name.to_owned(), color),
                 });
+                Some(Self::Classes(rows.collect()))
+            }
+            Legend::Labels { title, entries } => {
+                let rows =
+                    entries.into_iter().map(|(label, color)| (format!("{title} {label}"), color));
                 Some(Self::Classes(rows.collect()))
             }
             Legend::Map { title, low, high, colors } => {

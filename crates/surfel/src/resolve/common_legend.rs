@@ -6,8 +6,8 @@ use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
 use surfel_core::scene::color::{Legend, legend};
 
-/// Returns the legend of the first shown cloud that has one, by the settings of its object. Legends of classes are
-/// joined.
+/// Returns the legend of the first shown cloud that has one, by the settings of its object. Legends of classes, and
+/// those of labels of one name, are joined.
 pub fn common_legend(
     scene: &LoadedScene,
     clouds: &[PreparedCloud],
@@ -26,6 +26,15 @@ pub fn common_legend(
             classes.sort_unstable();
             classes.dedup();
             Legend::Classes(classes)
+        }
+        (
+            Legend::Labels { title, mut entries },
+            Legend::Labels { title: other, entries: others },
+        ) if title == other => {
+            entries.extend(others);
+            entries.sort_unstable();
+            entries.dedup();
+            Legend::Labels { title, entries }
         }
         (first, _) => first,
     });

@@ -19,6 +19,8 @@ pub enum KnownColumn {
 
 /// Names of longitudes, in degrees.
 const LONGITUDES: [&str; 4] = ["longitude", "lon", "lng", "long"];
+/// Names of columns of labels.
+const LABELS: [&str; 4] = ["label", "labels", "class", "classification"];
 /// Names of latitudes, in degrees.
 const LATITUDES: [&str; 2] = ["latitude", "lat"];
 
@@ -67,7 +69,7 @@ impl KnownColumn {
             _ => match plain.strip_prefix("scalar").unwrap_or(&plain) {
                 "radius" | "radii" => Self::Radius,
                 "intensity" | "reflectance" => Self::Intensity,
-                "class" | "classification" | "label" => Self::Classification,
+                "class" | "classification" => Self::Classification,
                 _ => return None,
             },
         })
@@ -100,6 +102,13 @@ fn without_unit(name: &str) -> &str {
     unit.map_or(name, |unit| &name[..unit])
 }
 
+/// Returns true for the name of a scalar column of labels: numbers of segments, objects or classes other than those of
+/// ASPRS, of which none is more than another.
+pub fn is_label(name: &str) -> bool {
+    let plain = plain_name(name);
+    LABELS.contains(&plain.strip_prefix("scalar").unwrap_or(&plain))
+}
+
 /// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
 pub fn plain_name(name: &str) -> String {
     name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()
@@ -126,11 +135,13 @@ mod tests {
             ("(m)", None),
             ("[z]x", None),
             ("Scalar field", None),
+            ("scalar_Label", None),
             ("f_rest_0", None),
         ] {
             assert_eq!(KnownColumn::from_name(name), meaning, "{name}");
         }
         assert!(KnownColumn::is_longitude("Lon") && !KnownColumn::is_longitude("x"));
+        assert!(is_label("scalar_Label") && is_label("class") && !is_label("labelled"));
         let named = KnownColumn::ALL.map(|column| KnownColumn::from_name(column.name()));
         assert_eq!(named, KnownColumn::ALL.map(Some));
     }

@@ -19,4 +19,6 @@ pub struct ScanStation {
     pub position: Option<DVec3>,
     /// Rotation from the scanner's axes to those of the world.
     pub rotation: DQuat,
+    /// Numbers of rows and columns of the scan's grid, if it has one.
+    pub grid: Option<[u64; 2]>,
 }

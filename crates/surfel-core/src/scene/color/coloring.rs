@@ -1,7 +1,7 @@
 //! Settings of point colours.
 
 use super::choose::choose_source;
-use super::source::ColorSource;
+use super::source::{CLASS, ColorSource};
 use super::support::{DEFAULT_RANGE, SupportColors};
 use crate::image::{Colormap, PercentileRange};
 use crate::math::Vec3;
@@ -41,7 +41,11 @@ impl Coloring {
 
     /// Returns the source for `cloud`, and the reason if it was chosen automatically.
     pub(super) fn source_for(&self, cloud: &PointCloud) -> (ColorSource, Option<String>) {
+        let has_class_labels = cloud.classification.is_none() && cloud.scalar(CLASS).is_some();
         match &self.source {
+            Some(ColorSource::Class) if has_class_labels => {
+                (ColorSource::Column(CLASS.to_owned()), None)
+            }
             Some(source) => (source.clone(), None),
             None => {
                 let (source, reason) = choose_source(cloud);

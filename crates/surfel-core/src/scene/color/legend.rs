@@ -1,10 +1,11 @@
 //! Legends: the meaning of the points' colours.
 
 use super::coloring::Coloring;
+use super::labels::{first_labels, labels};
 use super::mapping::Mapping;
 use super::source::ColorSource;
 use crate::error::Result;
-use crate::image::{class_color, class_name};
+use crate::image::{class_color, class_name, label_color};
 use crate::points::PointCloud;
 
 /// A legend of point colours.
@@ -25,10 +26,19 @@ pub enum Legend {
     },
     /// The classes of the cloud in ascending order, each with its name and sRGB-encoded colour.
     Classes(Vec<(u8, &'static str, [u8; 3])>),
+    /// Labels of a column in ascending order.
+    Labels {
+        /// Name of the column.
+        title: String,
+        /// Numbers with their sRGB-encoded colours.
+        entries: Vec<(i64, [u8; 3])>,
+    },
 }
 
 /// Number of colours in the legend of a map.
 const N_STEPS: usize = 32;
+/// Maximum number of labels in a legend.
+const MAX_LABELS: usize = 256;
 
 /// Returns the legend of the colours that [`colorize`](super::colorize) gives to the same cloud.
 ///
@@ -47,7 +57,13 @@ pub fn legend(cloud: &PointCloud, coloring: &Coloring) -> Result<Legend> {
         | ColorSource::Elevation
         | ColorSource::Support
         | ColorSource::Column(_) => {
-            Ok(steps_of(&Mapping::new(cloud, coloring, &source)?, source.to_string()))
+            let title = source.to_string();
+            if let Some(values) = labels(cloud, coloring, &source) {
+                let labels = first_labels(values, MAX_LABELS).into_iter();
+                let entries = labels.map(|label| (label, label_color(label))).collect();
+                return Ok(Legend::Labels { title, entries });
+            }
+            Ok(steps_of(&Mapping::new(cloud, coloring, &source)?, title))
         }
     }
 }

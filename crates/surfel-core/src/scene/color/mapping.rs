@@ -2,10 +2,11 @@
 
 use super::coloring::Coloring;
 use super::gamma::Gamma;
+use super::labels::labels;
 use super::source::ColorSource;
 use super::support::DEFAULT_RANGE;
 use crate::error::Result;
-use crate::image::{Colormap, PercentileRange};
+use crate::image::{Colormap, PercentileRange, is_data};
 use crate::points::{PointCloud, STRUCTURE};
 
 /// Range of the gray map that intensity uses if no map is named: shading is invisible on black.
@@ -51,8 +52,9 @@ impl<'c> Mapping<'c> {
         Ok(Self { value_at, range, map, map_range, gamma, range_origin })
     }
 
-    /// Returns the sRGB-encoded colour of a value.
+    /// Returns the sRGB-encoded colour of a value; grey where it is missing.
     pub fn color(&self, value: f64) -> [u8; 3] {
+        let value = if is_data(value) { value } else { f64::NAN };
         let (first, last) = self.map_range;
         self.map.color(first + (last - first) * self.gamma.apply(self.range.normalize(value)))
     }
@@ -81,14 +83,15 @@ fn automatic_range(
     }
 }
 
-/// Returns the range of the values of several clouds that are coloured alike, and a line about it; `None` if it is given, and
-/// if the source or a cloud has no values.
+/// Returns the range of the values of several clouds that are coloured alike, and a line about it; `None` if it is given, if
+/// the values are labels, and if the source or a cloud has no values.
 pub fn common_range(
     clouds: &[&PointCloud],
     coloring: &Coloring,
     source: &ColorSource,
 ) -> Option<((f64, f64), String)> {
-    if coloring.range.is_some() {
+    let are_labels = |cloud: &&PointCloud| labels(cloud, coloring, source).is_some();
+    if coloring.range.is_some() || clouds.iter().any(are_labels) {
         return None;
     }
     let values = clouds.iter().map(|cloud| Some((cloud.len(), source.values(cloud, coloring)?)));

@@ -6,6 +6,7 @@ mod support;
 mod coloring;
 mod gamma;
 mod mapping;
+mod labels;
 mod legend;
 
 pub use choose::choose_source;
@@ -20,6 +21,7 @@ use crate::image::class_color;
 use crate::points::{PointCloud, to_8_bits};
 use crate::progress::Progress;
 use gamma::Gamma;
+use labels::labels;
 use mapping::Mapping;
 use rayon::prelude::*;
 
@@ -71,6 +73,10 @@ pub fn colorize(
         | ColorSource::Elevation
         | ColorSource::Support
         | ColorSource::Column(_) => {
+            if let Some(values) = labels(cloud, coloring, &source) {
+                progress.note(&format!("color {source}: each number has a colour of its own"));
+                return Ok(for_all(&|i| labels::color_of(values.get(i))));
+            }
             let mapping = Mapping::new(cloud, coloring, &source)?;
             progress.note(&format!("color {source} {}", mapping.description()));
             Ok(for_all(&|i| mapping.color((mapping.value_at)(i))))
@@ -88,7 +94,7 @@ mod tests {
     //! Colours come from the right column, through the right map.
 
     use super::*;
-    use crate::image::Colormap;
+    use crate::image::{Colormap, label_color};
     use crate::math::Vec3;
     use crate::points::{Scalar, Values};
     use crate::progress::NoProgress;
@@ -162,6 +168,33 @@ mod tests {
             panic!("no map");
         };
         assert_eq!((low, high), (0.0, 2.0));
+    }
+
+    #[test]
+    fn labels_have_colors_of_their_own_unless_a_map_orders_them() {
+        let values = Values::F64((0..2500).map(|i| [-1.0, 3.0, 20.0, f64::MAX][i % 4]).collect());
+        let scalars = vec![Scalar { name: "label".into(), values: values.clone() }];
+        let cloud = PointCloud { scalars, ..lattice() };
+        let found = colorize(&cloud, &coloring(Some("label")), &NoProgress).unwrap();
+        let expected = [[128; 3], label_color(3), label_color(20), [128; 3]];
+        assert_eq!(found[..4], expected);
+        let entries = [-1, 3, 20].map(|label| (label, label_color(label)));
+        let legend_of = |coloring: &Coloring| legend(&cloud, coloring).unwrap();
+        let expected = Legend::Labels { title: "label".into(), entries: entries.to_vec() };
+        assert_eq!(legend_of(&coloring(Some("label"))), expected);
+        assert_eq!(common_range(&[&cloud], &coloring(None), &"label".parse().unwrap()), None);
+        let colormap = Some(Colormap::from_name("viridis").unwrap());
+        let ordered = Coloring { colormap, ..coloring(Some("label")) };
+        let Legend::Map { low, high, .. } = legend_of(&ordered) else { panic!("no map") };
+        assert_eq!((low, high), (-1.0, 20.0));
+        let found = colorize(&cloud, &ordered, &NoProgress).unwrap();
+        assert_eq!((found[1], found[3]), (ordered.colormap.unwrap().color(4.0 / 21.0), [128; 3]));
+        // What is called class without being one of ASPRS is a label.
+        let scalars = vec![Scalar { name: "class".into(), values }];
+        let cloud = PointCloud { scalars, ..lattice() };
+        let class = coloring(Some("class"));
+        assert!(ColorSource::Class.is_available_in(&cloud));
+        assert_eq!(colorize(&cloud, &class, &NoProgress).unwrap()[1], label_color(3));
     }
 
     #[test]

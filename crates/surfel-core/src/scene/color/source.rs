@@ -1,9 +1,12 @@
 //! Sources of point colours, their names and their colours in hexadecimal.
 
 use crate::error::{Error, Result};
-use crate::points::{PointCloud, Values};
+use crate::points::{PointCloud, Values, is_label};
 use std::fmt;
 use std::str::FromStr;
+
+/// Name of a column of labels that [`ColorSource::Class`] shows where there is no classification.
+pub(super) const CLASS: &str = "class";
 
 /// The column or value that the colours of points show.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +17,7 @@ pub enum ColorSource {
     Intensity,
     /// Height along [`Coloring::up`](super::Coloring::up), mapped to colours.
     Elevation,
-    /// Classification, in the usual colours of the classes.
+    /// Classification, in the usual colours of the classes; without one a column of labels named `class`.
     Class,
     /// Direction of the normal as (n + 1) / 2.
     Normal,
@@ -37,7 +40,7 @@ impl ColorSource {
             Self::Rgb => Some("rgb"),
             Self::Intensity => Some("intensity"),
             Self::Elevation => Some("elevation"),
-            Self::Class => Some("class"),
+            Self::Class => Some(CLASS),
             Self::Normal => Some("normal"),
             Self::Support => Some("support"),
             Self::Constant(_) | Self::Column(_) => None,
@@ -60,12 +63,15 @@ impl ColorSource {
     }
 
     /// True if the values of the source are names of things rather than amounts, so that no value lies between two
-    /// others: classes and whole numbers.
+    /// others: classes, labels and whole numbers.
     pub fn is_categorical(&self, cloud: &PointCloud) -> bool {
         match self {
             Self::Class => true,
             Self::Column(name) => {
-                matches!(cloud.scalar(name), Some(Values::U8(_) | Values::U16(_) | Values::I32(_)))
+                let values = cloud.scalar(name);
+                let is_whole =
+                    matches!(values, Some(Values::U8(_) | Values::U16(_) | Values::I32(_)));
+                is_whole || is_label(name)
             }
             _ => false,
         }
@@ -76,7 +82,7 @@ impl ColorSource {
         match self {
             Self::Rgb => cloud.colors.is_some(),
             Self::Intensity => cloud.intensity.is_some(),
-            Self::Class => cloud.classification.is_some(),
+            Self::Class => cloud.classification.is_some() || cloud.scalar(CLASS).is_some(),
             Self::Normal => cloud.normals.is_some(),
             Self::Elevation | Self::Support | Self::Constant(_) => true,
             Self::Column(name) => cloud.scalar(name).is_some(),
