@@ -15,6 +15,15 @@ pub fn class_name(class: u8) -> &'static str {
     }
 }
 
+/// Returns the class of a name of its own; case and separators do not matter, as in `low_vegetation`.
+pub fn class_named(name: &str) -> Option<u8> {
+    let letters = |name: &str| {
+        name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
+    };
+    let named = CLASSES.iter().position(|(known, _)| letters(known) == letters(name));
+    named.map(|class| class as u8)
+}
+
 /// Colour of unknown classes.
 const UNKNOWN: [u8; 3] = [77, 153, 153];
 
@@ -57,6 +66,10 @@ mod tests {
         assert_eq!((class_name(9), class_color(9)), ("water", [0, 0, 255]));
         assert_eq!((class_name(30), class_color(30)), ("reserved", UNKNOWN));
         assert_eq!((class_name(200), class_color(200)), ("user definable", UNKNOWN));
+        assert_eq!(
+            ["Ground", "low_vegetation", "reserved"].map(class_named),
+            [Some(2), Some(3), None]
+        );
     }
 
     #[test]

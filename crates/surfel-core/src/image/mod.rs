@@ -5,7 +5,7 @@ mod classification;
 mod percentile_range;
 mod srgb;
 
-pub use classification::{class_color, class_name};
+pub use classification::{class_color, class_name, class_named};
 pub use colormap::Colormap;
 pub use percentile_range::PercentileRange;
 pub use srgb::{

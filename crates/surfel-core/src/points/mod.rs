@@ -49,7 +49,7 @@ pub use cloud::gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
-pub use cloud::known_column::{KnownColumn, plain_name};
+pub use cloud::known_column::{KnownColumn, name_of_pdal, plain_name};
 pub use cloud::merge::merge;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};

@@ -1,6 +1,6 @@
 //! The columns to read from a file, chosen by the caller.
 
-use surfel_core::points::{PointCloud, STATION, plain_name};
+use surfel_core::points::{PointCloud, STATION, name_of_pdal, plain_name};
 
 use super::column_role::ColumnRole;
 
@@ -58,14 +58,17 @@ impl ColumnChoice {
     /// Returns the choice of these columns and of those with these names.
     pub(crate) fn with_names(&self, names: &[&str]) -> Self {
         let Self::Only(columns) = self else { return Self::All };
-        let named = names.iter().filter_map(|name| match ColumnRole::from_name(name) {
-            Some(ColumnRole::Position(_)) => None,
-            Some(ColumnRole::Normal(_)) => Some(Column::Normals),
-            Some(ColumnRole::Color(_)) => Some(Column::Colors),
-            Some(ColumnRole::Radius) => Some(Column::Radii),
-            Some(ColumnRole::Intensity) => Some(Column::Intensity),
-            Some(ColumnRole::Classification) => Some(Column::Classification),
-            Some(ColumnRole::Scalar(_)) | None => Some(Column::Scalar((*name).to_owned())),
+        let of_pdal = names.iter().filter_map(|name| name_of_pdal(name));
+        let named = names.iter().copied().chain(of_pdal).filter_map(|name| {
+            match ColumnRole::from_name(name) {
+                Some(ColumnRole::Position(_)) => None,
+                Some(ColumnRole::Normal(_)) => Some(Column::Normals),
+                Some(ColumnRole::Color(_)) => Some(Column::Colors),
+                Some(ColumnRole::Radius) => Some(Column::Radii),
+                Some(ColumnRole::Intensity) => Some(Column::Intensity),
+                Some(ColumnRole::Classification) => Some(Column::Classification),
+                Some(ColumnRole::Scalar(_)) | None => Some(Column::Scalar(name.to_owned())),
+            }
         });
         Self::Only(columns.iter().cloned().chain(named).collect())
     }
