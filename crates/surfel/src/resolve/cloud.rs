@@ -74,11 +74,12 @@ fn import_from_file(
         load_options.filter = None;
     }
     let loaded = if settings.preparation.vertices() {
-        let Loaded { cloud, info } = surfel_formats::load(file, &load_options, progress)?;
-        (graph_of(cloud), info)
+        surfel_formats::load(file, &load_options, progress)
+            .map(|Loaded { cloud, info }| (graph_of(cloud), info))
     } else {
-        surfel_formats::load_graph(file, &load_options, progress)?
+        surfel_formats::load_graph(file, &load_options, progress)
     };
+    let loaded = loaded.map_err(|error| reading_error(error, &settings.preparation))?;
     progress.end();
     Ok(loaded)
 }
@@ -208,6 +209,20 @@ fn kept_points(
 
 fn no_point_kept(files: &[PathBuf], key: Option<&'static str>, filter: &PointFilter) -> Error {
     Error::NoPointKept { files: files.to_vec(), key, filter: filter.to_string() }
+}
+
+/// Returns the error of points that were read under settings; that of a filter names the setting that it is of.
+pub fn reading_error(error: surfel_formats::Error, settings: &PreparationSettings) -> Error {
+    let surfel_formats::Error::Core(cause @ surfel_core::Error::UnknownName { found, .. }) = &error
+    else {
+        return error.into();
+    };
+    let filters = settings.point_filters().unwrap_or_default();
+    let mut filters = filters.into_iter();
+    match filters.find(|(_, filter)| filter.columns().contains(&found.as_str())) {
+        Some((key, _)) => Error::Unfit(format!("{} [{key}]", with_nearest(cause))),
+        None => error.into(),
+    }
 }
 
 /// Returns a cloud in the coordinates of its file: those of a node may be others.

@@ -27,11 +27,11 @@ pub use camera::{
     SceneCamera, camera_motion, choose_camera, choose_up, short_position, up_convention,
 };
 pub use check_files::check_files;
-pub(crate) use cloud::filter_cloud;
 pub use cloud::{
     can_be_colored, check_empty, prepare_cloud, report_denoise, report_normals, report_prepared,
     report_radii, state_known_sides,
 };
+pub(crate) use cloud::{filter_cloud, reading_error};
 pub(crate) use common_legend::common_legend;
 pub(crate) use common_range::with_common_ranges;
 pub(crate) use exposure::automatic_exposure;
