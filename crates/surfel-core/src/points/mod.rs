@@ -43,7 +43,7 @@ pub use cloud::color_bits::{COLOR_8_TO_16, have_8_bits, to_8_bits};
 pub use cloud::deformation::{Morph, Skin};
 pub use cloud::density::points_per_area;
 pub(crate) use cloud::filter::Polygon;
-pub use cloud::filter::{PointFilter, visit_column};
+pub use cloud::filter::{PointFilter, rings_cross, visit_column};
 pub use cloud::flags::{FLAGS, WITHHELD, is_flag};
 pub use cloud::gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,

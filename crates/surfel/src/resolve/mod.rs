@@ -1,5 +1,6 @@
 //! Turns a description into a scene that can be rendered: opens files and makes every automatic choice.
 
+mod crop_hints;
 mod cloud;
 mod camera;
 mod interior;
@@ -34,6 +35,7 @@ pub use cloud::{
 pub(crate) use cloud::{filter_cloud, reading_error};
 pub(crate) use common_legend::common_legend;
 pub(crate) use common_range::with_common_ranges;
+pub(crate) use crop_hints::report_crossing_rings;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};

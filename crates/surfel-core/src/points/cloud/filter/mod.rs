@@ -4,8 +4,10 @@ mod condition;
 mod parse;
 mod evaluate;
 mod polygon;
+mod crossing;
 
 use condition::{Condition, Operand, Relation};
+pub use crossing::rings_cross;
 pub use evaluate::visit_column;
 use evaluate::{Evaluation, color_range};
 pub(crate) use polygon::Polygon;
@@ -196,8 +198,6 @@ mod tests {
         assert_eq!(kept("Z(1000:1002]"), [1, 2]);
         assert_eq!(kept("Z[1002:]"), [2, 3]);
         assert_eq!(kept("!Classification[:2]"), [1, 3]);
-    }
-
         assert_eq!(kept("Classification![2:2]"), [1, 3]);
         assert_eq!(kept("Z!(1000:1002]"), [0, 3]);
     }
@@ -238,6 +238,8 @@ mod tests {
         let cloud = PointCloud { scalars: vec![angles], ..cloud() };
         let filter: PointFilter = "ScanAngleRank[0:5]".parse().unwrap();
         assert_eq!(filter.matches(&cloud, 0).unwrap(), [false, true, true, false]);
+    }
+
     #[test]
     fn missing_values_match_nothing_but_inequality() {
         assert_eq!(kept("intensity > 0"), [0, 1, 3]);
