@@ -1,7 +1,7 @@
 //! Names and colours of the ASPRS classes (LAS 1.4, table 17).
 
-/// Returns the sRGB-encoded colour of a class. Classes 0 to 9 have those of Potree's default scheme, 10 to 22 have
-/// distinct colours in place of Potree's yellow, and all others have Potree's colour for unknown classes.
+/// Returns the sRGB-encoded colour of a class. Classes 1 to 9 have those of Potree's default scheme, 0 a lighter grey
+/// than 1, 10 to 22 distinct colours in place of Potree's yellow, and all others Potree's colour for unknown classes.
 pub fn class_color(class: u8) -> [u8; 3] {
     CLASSES.get(usize::from(class)).map_or(UNKNOWN, |(_, color)| *color)
 }
@@ -29,7 +29,7 @@ const UNKNOWN: [u8; 3] = [77, 153, 153];
 
 /// Names and sRGB-encoded colours of the classes by number.
 const CLASSES: [(&str, [u8; 3]); 23] = [
-    ("never classified", [128, 128, 128]),
+    ("never classified", [176, 176, 176]),
     ("unclassified", [128, 128, 128]),
     ("ground", [161, 82, 46]),
     ("low vegetation", [0, 255, 0]),
@@ -74,8 +74,7 @@ mod tests {
 
     #[test]
     fn colors_are_distinct() {
-        // Classes 0 and 1 share a grey, as neither classifies a point.
-        for a in 1..23 {
+        for a in 0..23 {
             for b in a + 1..=23 {
                 let difference =
                     class_color(a).into_iter().zip(class_color(b)).map(|(a, b)| a.abs_diff(b));

@@ -23,8 +23,12 @@ pub fn common_legend(
     let joined = legends.reduce(|first, other| match (first, other) {
         (Legend::Classes(mut classes), Legend::Classes(others)) => {
             classes.extend(others);
-            classes.sort_unstable();
-            classes.dedup();
+            classes.sort_unstable_by_key(|row| row.class);
+            classes.dedup_by(|later, first| {
+                let is_same = later.class == first.class;
+                first.n_points += if is_same { later.n_points } else { 0 };
+                is_same
+            });
             Legend::Classes(classes)
         }
         (first, _) => first,
@@ -67,7 +71,7 @@ mod tests {
 
     fn classes(legend: Legend) -> Vec<u8> {
         match legend {
-            Legend::Classes(classes) => classes.iter().map(|(class, ..)| *class).collect(),
+            Legend::Classes(classes) => classes.iter().map(|row| row.class).collect(),
             other => panic!("{other:?}"),
         }
     }
@@ -95,3 +99,5 @@ mod tests {
         assert_eq!(classes(found), [2, 6, 9]);
     }
 }
+        let Legend::Classes(rows) = &found else { panic!("{found:?}") };
+        assert_eq!(rows.iter().map(|row| row.n_points).collect::<Vec<_>>(), [163, 40, 40]);
