@@ -4,7 +4,21 @@ use super::loaded::LoadedScene;
 use crate::description::SceneDescription;
 use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
-use surfel_core::scene::color::{Legend, legend};
+use surfel_core::scene::color::{Legend, choose_source, legend};
+
+/// Returns true if a legend explains the colours of a shown cloud.
+pub fn has_legend(
+    scene: &LoadedScene,
+    clouds: &[PreparedCloud],
+    description: &SceneDescription,
+) -> bool {
+    let mut geometries = scene.clouds().map(|(i, _)| i).zip(clouds);
+    geometries.any(|(i, cloud)| {
+        let stated = scene.settings_of(i, description).color.color;
+        let source = stated.unwrap_or_else(|| choose_source(cloud).0);
+        scene.is_shown(i, description) && source.has_legend()
+    })
+}
 
 /// Returns the legend of the first shown cloud that has one, by the settings of its object. Legends of classes are
 /// joined.
@@ -96,8 +110,8 @@ mod tests {
     fn classes_of_all_clouds_are_listed() {
         let plain = json!({});
         let found = legend_of("class", &[plain.clone(), plain.clone(), plain], &[9, 2, 6]);
+        let Legend::Classes(rows) = &found else { panic!("{found:?}") };
+        assert_eq!(rows.iter().map(|row| row.n_points).collect::<Vec<_>>(), [163, 40, 40]);
         assert_eq!(classes(found), [2, 6, 9]);
     }
 }
-        let Legend::Classes(rows) = &found else { panic!("{found:?}") };
-        assert_eq!(rows.iter().map(|row| row.n_points).collect::<Vec<_>>(), [163, 40, 40]);
