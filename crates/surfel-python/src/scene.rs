@@ -22,11 +22,11 @@ use surfel::live_view::LiveView;
 use surfel::overlay::faults;
 use surfel::ray_query::WHOLE_RAY;
 use surfel::{Error, RenderedImage, SceneDescription};
-use surfel_core::image::{Image, NO_ID, class_color, class_name};
+use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::scene::Background;
-use surfel_core::scene::color::Legend;
+use surfel_core::scene::color::{Legend, LegendClass};
 use surfel_core::words::counted;
 
 /// A scene of files, clouds and meshes, which shows nothing yet. Threads may share it.
@@ -304,9 +304,9 @@ impl PyScene {
             image.color.copy_from_slice(pixels);
             show_background(&mut image, view.flat.background);
             let legend = match (&view.trees.legend, classes) {
-                (Legend::Classes(_), Some(classes)) => Legend::Classes(
-                    classes.iter().map(|i| (*i, class_name(*i), class_color(*i))).collect(),
-                ),
+                (Legend::Classes(_), Some(classes)) => {
+                    Legend::Classes(classes.iter().map(|i| LegendClass::new(*i, 0)).collect())
+                }
                 (legend, _) => legend.clone(),
             };
             let image = view.finished_with(image, legend);
@@ -318,7 +318,7 @@ impl PyScene {
     fn _classes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         self.with_view(py, None, None, |_, chosen, _| {
             Ok(match &chosen.view.trees.legend {
-                Legend::Classes(classes) => classes.iter().map(|(class, ..)| *class).collect(),
+                Legend::Classes(classes) => classes.iter().map(|row| row.class).collect(),
                 _ => Vec::new(),
             })
         })

@@ -8,7 +8,8 @@ use crate::picture::RenderedImage;
 use crate::progress_log::{CancelOnly, Choice, ProgressLog, Warning};
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
-    Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps, expose_materials,
+    Metering, Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps,
+    expose_materials,
 };
 use surfel_core::flat::{FlatPunctualLight, FlatScene, Instance};
 use surfel_core::math::{Aabb, DQuat, Vec3};
@@ -31,6 +32,7 @@ pub struct BuiltScene {
     overlay: Overlay,
     system: Option<CoordinateSystem>,
     up: Vec3,
+    metering: Metering,
     /// Lights before a turntable turns them.
     lights: Vec<Light>,
     /// Lamps before a turntable turns them.
@@ -65,7 +67,7 @@ impl Resolved {
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
         let Self { scene, settings, description, choices, warnings, .. } = self;
-        let Self { sequences, camera, turned_room, overlay, system, up, .. } = self;
+        let Self { sequences, camera, turned_room, overlay, system, up, metering, .. } = self;
         let renderer = SceneRenderer::new(&description.run)?;
         let mut flat = FlatScene::new(&scene, progress)?;
         flat.camera_planes = planes_before(turned_room.as_ref(), &flat.camera);
@@ -84,6 +86,7 @@ impl Resolved {
             overlay,
             system,
             up,
+            metering,
             lights,
             lamps,
             stops: 0.0,
@@ -145,7 +148,8 @@ impl BuiltScene {
     pub fn choose_exposure(&mut self, progress: &dyn Progress) -> Result<()> {
         let log = ProgressLog::new(progress);
         let exposure = self.description.light.exposure();
-        let stops = exposure_stops(exposure, &self.renderer, &self.flat, &self.settings, &log)?;
+        let picture = (&self.flat, &self.settings);
+        let stops = exposure_stops(exposure, &self.renderer, picture, &self.metering, &log)?;
         self.choices.extend(log.into_records().choices);
         expose(&mut self.flat, stops);
         self.stops = stops;
@@ -266,15 +270,16 @@ impl BuiltScene {
 pub(crate) fn exposure_stops(
     exposure: Exposure,
     renderer: &dyn Renderer,
-    flat: &FlatScene,
-    settings: &Settings,
+    (flat, settings): (&FlatScene, &Settings),
+    metering: &Metering,
     progress: &dyn Progress,
 ) -> Result<f32> {
     match exposure {
         Exposure::Stops(stops) => Ok(stops as f32),
         Exposure::Auto if flat.lights.is_empty() && flat.punctual_lights.is_empty() => Ok(0.0),
         Exposure::Auto => {
-            let stops = automatic_exposure(renderer, flat, settings, &CancelOnly(progress))?;
+            let stops =
+                automatic_exposure(renderer, flat, settings, metering, &CancelOnly(progress))?;
             progress.choice(&format!("exposure {stops:+.2} stops"), &["exposure"]);
             Ok(stops)
         }

@@ -30,7 +30,7 @@ pub enum Error {
     #[error("{0}")]
     Unfit(String),
     /// A filter keeps no point.
-    #[error("{}no point meets {filter}", prefix(files))]
+    #[error("{}no point meets {filter}{hint}", prefix(files))]
     NoPointKept {
         /// Files of the points; none if they are not told apart.
         files: Vec<PathBuf>,
@@ -38,6 +38,8 @@ pub enum Error {
         key: Option<&'static str>,
         /// The filter, as a description has it.
         filter: String,
+        /// A clause about where the area and the points lie, if they are apart; it begins with `; `.
+        hint: String,
     },
     /// The system denies threads.
     #[error("the threads cannot be started; ask for fewer [threads]: {0}")]

@@ -12,8 +12,8 @@ use crate::picture::RenderedImage;
 use crate::point_overlap::check_overlap;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, common_legend, coordinate_system,
-    expose, finish_graph, hide_walls, render_settings, with_common_ranges,
+    AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, Metering, common_legend,
+    coordinate_system, expose, finish_graph, hide_walls, render_settings, with_common_ranges,
 };
 use crate::scene_keys::{filter_key, grouping_key, preparation_key, tree_key};
 use crate::thread_pools::{lower_priority, start_threads};
@@ -25,6 +25,7 @@ use surfel_core::math::DVec3;
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::scene::color::Legend;
 use surfel_core::scene::{Background, Camera, ClipPlane, Projection, Scene};
 use surfel_core::trace::Simd;
 
@@ -289,7 +290,10 @@ impl LiveScene {
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
         let at = |secs| self.flat_at(cache, &kept, secs, description, &auto, progress);
         let (mut trees, mut flat) = at(metered_at)?;
-        let meter = || exposure_stops(exposure, &self.renderer, &flat, &settings, progress);
+        let has_legend = trees.legend != Legend::None;
+        let metering = Metering { plan: auto.whole_plan, has_legend };
+        let picture = (&flat, &settings);
+        let meter = || exposure_stops(exposure, &self.renderer, picture, &metering, progress);
         let stops = self.preparation_threads.install(meter)?;
         if metered_at != time_secs {
             (trees, flat) = at(time_secs)?;

@@ -2,7 +2,7 @@
 
 use crate::description::PreparationSettings;
 use crate::error::{Error, Result};
-use crate::resolve::filter_cloud;
+use crate::resolve::{filter_cloud, reading_error};
 use std::path::PathBuf;
 use std::sync::Arc;
 use surfel_core::math::DAffine3;
@@ -46,7 +46,8 @@ impl PointSource {
         progress: &dyn Progress,
     ) -> Result<Loaded> {
         match self {
-            Self::File(file) => Ok(surfel_formats::load(&file, options, progress)?),
+            Self::File(file) => surfel_formats::load(&file, options, progress)
+                .map_err(|error| reading_error(error, settings)),
             Self::Cloud(cloud, info) => {
                 let none = cloud.subset(&[]);
                 let cloud = Arc::unwrap_or_clone(cloud);

@@ -5,8 +5,8 @@ use crate::description::{ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
 pub use crate::point_source::PointSource;
 use crate::resolve::{
-    MemoryEstimate, check_empty, report_denoise, report_normals, report_radii,
-    report_unused_of_files, report_unused_structure,
+    MemoryEstimate, check_empty, report_crossing_rings, report_denoise, report_normals,
+    report_radii, report_unused_of_files, report_unused_structure,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -101,6 +101,7 @@ fn read(
         check_points(MemoryEstimate::from_files(&infos, settings.subsample, 0))?;
     }
     report_unused_of_files(infos.values(), settings, progress);
+    report_crossing_rings([settings], progress);
     let options = settings.load_options(ColumnChoice::All)?;
     let mut parts: Vec<Loaded> = Vec::new();
     for source in sources {
@@ -381,7 +382,7 @@ mod tests {
         std::fs::remove_file(&file).unwrap();
         let errors = [of_points.unwrap_err(), of_file.unwrap_err(), of_scene.unwrap_err()];
         for error in &errors {
-            let Error::NoPointKept { files, key, filter } = error else { panic!("{error}") };
+            let Error::NoPointKept { files, key, filter, .. } = error else { panic!("{error}") };
             assert_eq!((files.len(), *key, &filter[..]), (1, Some("filter"), "x > 50"));
         }
     }

@@ -1,7 +1,7 @@
 //! The meaning of the colours, as the page shows it.
 
 use serde_json::{Value, json};
-use surfel_core::scene::color::Legend;
+use surfel_core::scene::color::{Legend, LegendClass};
 
 /// Returns a legend as the page shows it; null where the colours need none.
 pub fn legend_json(legend: &Legend) -> Value {
@@ -12,7 +12,7 @@ pub fn legend_json(legend: &Legend) -> Value {
             json!({ "kind": "map", "title": title, "low": low, "high": high, "colors": colors })
         }
         Legend::Classes(classes) => {
-            let entries = classes.iter().map(|(class, name, color)| {
+            let entries = classes.iter().map(|LegendClass { class, name, color, .. }| {
                 json!({ "name": format!("{class} {name}"), "color": hex(*color) })
             });
             let entries: Vec<Value> = entries.collect();

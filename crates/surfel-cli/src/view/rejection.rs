@@ -10,8 +10,8 @@ pub fn rejection(error: impl Into<surfel::Error>) -> Error {
             let text = error.reason();
             Error::InvalidRequest { key: Some(error.path).filter(|path| !path.is_empty()), text }
         }
-        surfel::Error::NoPointKept { key, filter, .. } => {
-            let text = format!("no point meets {filter}");
+        surfel::Error::NoPointKept { key, filter, hint, .. } => {
+            let text = format!("no point meets {filter}{hint}");
             Error::InvalidRequest { key: key.map(str::to_owned), text }
         }
         error => Error::invalid_request(error.to_string().replace('\n', " ")),

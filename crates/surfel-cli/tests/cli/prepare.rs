@@ -172,6 +172,14 @@ fn points_are_chosen_by_their_columns() {
     }
     let unknown = fail(&["prepare", &cloud, "-o", &kept, "--filter", "clas == 2"], 1);
     assert!(unknown.contains("'clas'") && unknown.contains("classification"), "{unknown}");
+    let plain = folder.write("plain.xyz", square(10, 200));
+    for (option, value, column) in
+        [("--class", "2", "classification"), ("--returns", "last", "return_number")]
+    {
+        let lacks = fail(&["prepare", &plain, "-o", &kept, option, value], 1);
+        assert!(lacks.contains(&format!("'{column}'")), "{lacks}");
+        assert!(lacks.trim_end().ends_with(&format!("[{option}]")), "{lacks}");
+    }
     let broken = fail(&["prepare", &cloud, "-o", &kept, "--filter", "x = 2"], 2);
     assert!(broken.contains("character 3: found `=`"), "{broken}");
     let class = fail(&["prepare", &cloud, "-o", &kept, "--class", "gras"], 2);

@@ -1,7 +1,7 @@
 //! Names and colours of the ASPRS classes (LAS 1.4, table 17).
 
-/// Returns the sRGB-encoded colour of a class. Classes 0 to 9 have those of Potree's default scheme, 10 to 22 have
-/// distinct colours in place of Potree's yellow, and all others have Potree's colour for unknown classes.
+/// Returns the sRGB-encoded colour of a class. Classes 1 to 9 have those of Potree's default scheme, 0 a lighter grey
+/// than 1, 10 to 22 distinct colours in place of Potree's yellow, and all others Potree's colour for unknown classes.
 pub fn class_color(class: u8) -> [u8; 3] {
     CLASSES.get(usize::from(class)).map_or(UNKNOWN, |(_, color)| *color)
 }
@@ -15,12 +15,21 @@ pub fn class_name(class: u8) -> &'static str {
     }
 }
 
+/// Returns the class of a name of its own; case and separators do not matter, as in `low_vegetation`.
+pub fn class_named(name: &str) -> Option<u8> {
+    let letters = |name: &str| {
+        name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
+    };
+    let named = CLASSES.iter().position(|(known, _)| letters(known) == letters(name));
+    named.map(|class| class as u8)
+}
+
 /// Colour of unknown classes.
 const UNKNOWN: [u8; 3] = [77, 153, 153];
 
 /// Names and sRGB-encoded colours of the classes by number.
 const CLASSES: [(&str, [u8; 3]); 23] = [
-    ("never classified", [128, 128, 128]),
+    ("never classified", [176, 176, 176]),
     ("unclassified", [128, 128, 128]),
     ("ground", [161, 82, 46]),
     ("low vegetation", [0, 255, 0]),
@@ -57,12 +66,15 @@ mod tests {
         assert_eq!((class_name(9), class_color(9)), ("water", [0, 0, 255]));
         assert_eq!((class_name(30), class_color(30)), ("reserved", UNKNOWN));
         assert_eq!((class_name(200), class_color(200)), ("user definable", UNKNOWN));
+        assert_eq!(
+            ["Ground", "low_vegetation", "reserved"].map(class_named),
+            [Some(2), Some(3), None]
+        );
     }
 
     #[test]
     fn colors_are_distinct() {
-        // Classes 0 and 1 share a grey, as neither classifies a point.
-        for a in 1..23 {
+        for a in 0..23 {
             for b in a + 1..=23 {
                 let difference =
                     class_color(a).into_iter().zip(class_color(b)).map(|(a, b)| a.abs_diff(b));

@@ -6,7 +6,7 @@ mod label_color;
 mod percentile_range;
 mod srgb;
 
-pub use classification::{class_color, class_name};
+pub use classification::{class_color, class_name, class_named};
 pub use colormap::Colormap;
 pub use label_color::label_color;
 pub use percentile_range::{PercentileRange, is_data};

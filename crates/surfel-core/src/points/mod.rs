@@ -43,13 +43,13 @@ pub use cloud::color_bits::{COLOR_8_TO_16, have_8_bits, to_8_bits};
 pub use cloud::deformation::{Morph, Skin};
 pub use cloud::density::points_per_area;
 pub(crate) use cloud::filter::Polygon;
-pub use cloud::filter::{PointFilter, visit_column};
+pub use cloud::filter::{PointFilter, rings_cross, visit_column};
 pub use cloud::flags::{FLAGS, WITHHELD, is_flag};
 pub use cloud::gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
-pub use cloud::known_column::{KnownColumn, is_label, plain_name};
+pub use cloud::known_column::{KnownColumn, is_label, name_of_pdal, plain_name};
 pub use cloud::merge::merge;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};

@@ -1,6 +1,6 @@
 //! The columns to read from a file, chosen by the caller.
 
-use surfel_core::points::{PointCloud, STATION, plain_name};
+use surfel_core::points::{PointCloud, STATION, name_of_pdal, plain_name};
 
 use super::column_role::ColumnRole;
 
@@ -58,8 +58,9 @@ impl ColumnChoice {
     /// Returns the choice of these columns and of those with these names.
     pub(crate) fn with_names(&self, names: &[&str]) -> Self {
         let Self::Only(columns) = self else { return Self::All };
-        let named = names.iter().flat_map(|name| {
-            let scalar = Column::Scalar((*name).to_owned());
+        let of_pdal = names.iter().filter_map(|name| name_of_pdal(name));
+        let named = names.iter().copied().chain(of_pdal).flat_map(|name| {
+            let scalar = Column::Scalar(name.to_owned());
             match ColumnRole::from_name(name) {
                 Some(ColumnRole::Position(_)) => vec![],
                 Some(ColumnRole::Normal(_)) => vec![Column::Normals],

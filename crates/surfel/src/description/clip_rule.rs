@@ -12,27 +12,12 @@ pub struct ClipBoxRule;
 
 impl Rule<ClipBox> for ClipBoxRule {
     fn read(&self, value: &Value, _: &Path) -> Result<ClipBox, Invalid> {
-        let wrong = || {
+        let ranges = ranges(value).ok_or_else(|| {
             expected(
                 "two or three ranges from low to high as in ([0,10],[0,10],[2,5]), or six numbers x0,y0,z0,x1,y1,z1",
             )
-        };
-        let any = [f64::NEG_INFINITY, f64::INFINITY];
-        let ranges = match (value.as_str().map(bracketed_ranges), as_numbers(value).as_deref()) {
-            (Some(Some(ranges)), _) => ranges,
-            (_, Some(&[x0, y0, z0, x1, y1, z1])) => vec![[x0, x1], [y0, y1], [z0, z1]],
-            _ => return Err(wrong()),
-        };
-        let ranges = match ranges[..] {
-            [x, y] => [x, y, any],
-            [x, y, z] => [x, y, z],
-            _ => return Err(wrong()),
-        };
-        if !ranges.iter().all(|[low, high]| low <= high) {
-            return Err(wrong());
-        }
-        let [low, high] = [0, 1].map(|end| DVec3::from_array(ranges.map(|range| range[end])));
-        Ok(ClipBox { min: low, max: high })
+        })?;
+        box_of(ranges)
     }
 
     fn write(&self, value: &ClipBox) -> Value {
@@ -44,6 +29,35 @@ impl Rule<ClipBox> for ClipBoxRule {
 
     fn may_begin_with_hyphen(&self) -> bool {
         true
+    }
+}
+
+/// A range that contains every number.
+pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// Returns the box of ranges along the axes X, Y and Z.
+///
+/// # Errors
+///
+/// Fails for a range whose higher end comes first.
+pub(super) fn box_of(ranges: [[f64; 2]; 3]) -> Result<ClipBox, Invalid> {
+    if let Some([first, second]) = ranges.into_iter().find(|[low, high]| high < low) {
+        let message = format!("the lower end of a range first, as in [{second},{first}]");
+        return Err(expected(message));
+    }
+    let [min, max] = [0, 1].map(|end| DVec3::from_array(ranges.map(|range| range[end])));
+    Ok(ClipBox { min, max })
+}
+
+/// Reads the ranges of a box.
+pub(super) fn ranges(value: &Value) -> Option<[[f64; 2]; 3]> {
+    if let Some(&[x0, y0, z0, x1, y1, z1]) = as_numbers(value).as_deref() {
+        return Some([[x0, x1], [y0, y1], [z0, z1]]);
+    }
+    match bracketed_ranges(value.as_str()?)?[..] {
+        [x, y] => Some([x, y, ANY]),
+        [x, y, z] => Some([x, y, z]),
+        _ => None,
     }
 }
 

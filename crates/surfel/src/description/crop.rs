@@ -1,13 +1,12 @@
 //! The area whose points are kept: bounds, polygons as text, or those of a file.
 
 use super::Invalid;
-use super::clip_rule::ClipBoxRule;
+use super::clip_rule::{ANY, ClipBoxRule, box_of, ranges};
 use super::rule::{Rule, absolute_text, as_numbers};
 use geojson::{GeoJson, Geometry, GeometryValue};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use surfel_core::math::DVec3;
-use surfel_core::points::PointFilter;
+use surfel_core::points::{PointFilter, rings_cross};
 use surfel_core::scene::ClipBox;
 use wkt::Wkt;
 
@@ -35,24 +34,59 @@ impl Crop {
     ///
     /// Fails for a file that cannot be read or has no polygons, and for polygons with broken rings.
     pub fn filter(&self) -> Result<PointFilter, Invalid> {
-        let (polygons, file) = match self {
-            Self::Bounds(bounds) => {
-                let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
-                return Ok(PointFilter::within_box(low, high));
-            }
-            Self::Wkt(text) => (polygons_of_wkt(text), None),
+        if let Self::Bounds(bounds) = self {
+            let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
+            return Ok(PointFilter::within_box(low, high));
+        }
+        let filter = PointFilter::within_polygons(&self.polygons()?);
+        filter.map_err(|error| self.invalid(error.to_string()))
+    }
+
+    /// Returns true if rings of a polygon cross, which makes holes of areas inside of an even number of them.
+    ///
+    /// # Errors
+    ///
+    /// Fails for a file that cannot be read or has no polygons.
+    pub fn crosses(&self) -> Result<bool, Invalid> {
+        Ok(self.polygons()?.iter().any(|rings| rings_cross(rings)))
+    }
+
+    /// Returns the least and the greatest X and Y of the area.
+    ///
+    /// # Errors
+    ///
+    /// Fails for a file that cannot be read or has no polygons.
+    pub fn xy_bounds(&self) -> Result<[[f64; 2]; 2], Invalid> {
+        if let Self::Bounds(ClipBox { min, max }) = self {
+            return Ok([[min.x, max.x], [min.y, max.y]]);
+        }
+        let polygons = self.polygons()?;
+        let corners = || polygons.iter().flatten().flatten();
+        Ok([0, 1].map(|axis| {
+            corners().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], corner| {
+                [low.min(corner[axis]), high.max(corner[axis])]
+            })
+        }))
+    }
+
+    /// Returns the polygons; none if the area is given by bounds.
+    fn polygons(&self) -> Result<Vec<Rings>, Invalid> {
+        let polygons = match self {
+            Self::Bounds(_) => Ok(Vec::new()),
+            Self::Wkt(text) => polygons_of_wkt(text),
             Self::File(path) => {
                 let text = surfel_formats::load_text(path, MAX_BYTES)
                     .map_err(|error| Invalid::at("crop", error.to_string()))?;
-                let polygons =
-                    if is_wkt(&text) { polygons_of_wkt(&text) } else { polygons_of_geojson(&text) };
-                (polygons, Some(path.clone()))
+                if is_wkt(&text) { polygons_of_wkt(&text) } else { polygons_of_geojson(&text) }
             }
         };
-        let filter = polygons.and_then(|polygons| {
-            PointFilter::within_polygons(&polygons).map_err(|error| error.to_string())
-        });
-        filter.map_err(|message| Invalid { file, ..Invalid::at("crop", message) })
+        polygons.map_err(|message| self.invalid(message))
+    }
+
+    /// Returns an error of the polygons, which names their file.
+    fn invalid(&self, message: String) -> Invalid {
+        let file = if let Self::File(path) = self { Some(path.clone()) } else { None };
+        Invalid { file, ..Invalid::at("crop", message) }
     }
 }
 
@@ -75,8 +109,18 @@ fn polygons_of_wkt(text: &str) -> Result<Vec<Rings>, String> {
         Ok(Wkt::Polygon(polygon)) => Ok(vec![rings(&polygon)]),
         Ok(Wkt::MultiPolygon(several)) => Ok(several.polygons().iter().map(rings).collect()),
         Ok(_) => Err("expected POLYGON or MULTIPOLYGON".to_owned()),
-        Err(error) => Err(format!("expected a polygon as well-known text: {error}")),
+        Err(error) => Err(match broken_coordinate(text) {
+            Some(word) => format!("expected numbers as coordinates, not `{word}`"),
+            None => format!("expected a polygon as well-known text: {error}"),
+        }),
     }
+}
+
+/// Returns the first word of well-known text in the place of a coordinate that is no finite number.
+fn broken_coordinate(text: &str) -> Option<&str> {
+    let (_, rings) = text.split_once('(')?;
+    let mut words = rings.split(|c: char| c.is_whitespace() || matches!(c, '(' | ')' | ','));
+    words.find(|word| !word.is_empty() && !word.parse::<f64>().is_ok_and(f64::is_finite))
 }
 
 fn polygons_of_geojson(text: &str) -> Result<Vec<Rings>, String> {
@@ -128,17 +172,11 @@ impl Rule<Crop> for CropRule {
             )
         };
         if let Some(&[x0, y0, x1, y1]) = as_numbers(value).as_deref() {
-            let (min, max) =
-                (DVec3::new(x0, y0, f64::NEG_INFINITY), DVec3::new(x1, y1, f64::INFINITY));
-            return if min.cmple(max).all() {
-                Ok(Crop::Bounds(ClipBox { min, max }))
-            } else {
-                Err(wrong())
-            };
+            return box_of([[x0, x1], [y0, y1], ANY]).map(Crop::Bounds);
         }
         let text = value.as_str().map_or("", str::trim);
         if as_numbers(value).is_some() || text.starts_with('(') {
-            return ClipBoxRule.read(value, folder).map(Crop::Bounds).map_err(|_| wrong());
+            return box_of(ranges(value).ok_or_else(wrong)?).map(Crop::Bounds);
         }
         match text {
             "" => Err(wrong()),
@@ -192,12 +230,18 @@ mod tests {
 
     #[test]
     fn broken_areas_are_refused_with_the_reason() {
-        for value in [json!(""), json!([1, 2, 3]), json!("5,0,1,1"), json!("([0,1)"), json!(true)] {
+        for value in [json!(""), json!([1, 2, 3]), json!("([0,1)"), json!(true)] {
             assert!(read(value.clone()).unwrap_err().contains("expected bounds"), "{value}");
+        }
+        for value in ["5,0,1,1", "([5,1],[0,1])", "0,5,0,0,1,0"] {
+            let error = read(json!(value)).unwrap_err();
+            assert_eq!(error, "expected the lower end of a range first, as in [1,5]", "{value}");
         }
         let refused = |text: &str| read(json!(text)).unwrap_err();
         assert!(refused("POLYGON ((0 0, 1 1, 0 0))").contains("a ring of 2 corners"));
-        assert!(refused("POLYGON ((0 0, nan 1, 2 2, 0 0))").contains("well-known text"));
+        let not_finite = "expected numbers as coordinates, not `nan`";
+        assert_eq!(refused("POLYGON ((0 0, nan 1, 2 2, 0 0))"), not_finite);
+        assert!(refused("POLYGON ((0 0, 1 1, 2 2, 0 0)").contains("well-known text"));
         assert!(refused("POLYGON EMPTY").contains("no ring"));
         assert!(refused("POLYGON ((0 0, 1").contains("well-known text"));
     }

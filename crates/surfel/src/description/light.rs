@@ -40,7 +40,8 @@ settings! {
         environment_rotation: f64 = 0.0, number(-360.0, 360.0), "DEG";
         /// Multiplies the light of the environment map.
         environment_strength: f64 = 1.0, GAIN, "FACTOR";
-        /// Exposure in stops, or auto: the brightest hundredth of the scene comes just below white.
+        /// Exposure in stops, or auto: the brightest hundredth of the scene comes just below white; where a legend
+        /// explains the colours, level surfaces in the light show their own.
         exposure: Exposure = Exposure::Auto, ExposureRule, "EV";
     }
 }

@@ -73,8 +73,8 @@ settings! {
     /// The reduction and completion of points before they become a surface.
     pub struct PreparationSettings {
         /// Keeps only points whose columns meet a condition, as in "classification == 2 && z < 1200" or
-        /// "intensity[100:]"; surfel info lists the columns. Colours go from 0 to 255, or to
-        /// 65535 where they are compared with a number above 255.
+        /// "class != ground", or are in ranges of PDAL, as in "Classification![7:7],Z[0:100]"; surfel info lists the
+        /// columns. Colours go from 0 to 255, or to 65535 where they are compared with a number above 255.
         filter: PointFilter, parsed(PointFilter::to_string), "CONDITION", common;
         /// Keeps only points of these ASPRS classes, as in 2,6 or ground,building. Without it, all but the classes of noise,
         /// 7 and 18, are kept.

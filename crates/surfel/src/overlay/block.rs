@@ -55,7 +55,8 @@ impl<'a> Block<'a> {
     /// Places a block in a corner.
     pub fn new(content: Content<'a>, corner: Corner, layout: &Layout) -> Self {
         let text_size = layout.text_size;
-        let area = layout.area(corner, content.size(text_size, layout.picture[1]));
+        let height = layout.picture[1] - 2.0 * text_size - layout.lift;
+        let area = layout.area(corner, content.size(text_size, height));
         Self { corner, area, text_size, content }
     }
 
@@ -81,15 +82,15 @@ impl<'a> Block<'a> {
 }
 
 impl Content<'_> {
-    /// Returns width and height in pixels in a picture of this height.
-    fn size(&self, text_size: f32, picture_height: f32) -> [f32; 2] {
+    /// Returns width and height in pixels where this height is free.
+    fn size(&self, text_size: f32, max_height: f32) -> [f32; 2] {
         match self {
             Self::Caption(text) => [text_width(text, text_size) + text_size, 1.6 * text_size],
             Self::ScaleBar { text, length } => {
                 [length.max(text_width(text, text_size)) + text_size, 2.4 * text_size]
             }
             Self::North(_) => [(ARROW_LENGTH + 2.0) * text_size; 2],
-            Self::Legend(legend) => legend.size(text_size, picture_height),
+            Self::Legend(legend) => legend.size(text_size, max_height),
         }
     }
 }

@@ -146,8 +146,9 @@ impl Overlay {
         if let Some(legend) = &self.legend {
             let is_free = |corner: &Corner| blocks.iter().all(|block| block.corner != *corner);
             let free = CORNERS.into_iter().filter(is_free);
-            let candidates =
-                free.map(|corner| Block::new(Content::Legend(legend), corner, &layout));
+            let candidates = free
+                .map(|corner| Block::new(Content::Legend(legend), corner, &layout))
+                .filter(|block| 0.0 < block.area.height);
             let covered = |block: &Block| match (style.legend_corner, self.is_fixed) {
                 (Some(kept), _) => f32::from(u8::from(block.corner != kept)),
                 (None, true) => 0.0,
@@ -219,6 +220,7 @@ mod tests {
     use super::*;
     use surfel_core::math::DVec3;
     use surfel_core::progress::NoProgress;
+    use surfel_core::scene::color::LegendClass;
 
     fn plan(height: f64) -> Camera {
         Camera {
@@ -291,7 +293,8 @@ mod tests {
     #[test]
     fn the_legend_takes_the_freest_corner() {
         let picture = PictureSettings { legend: Some(true), ..PictureSettings::default() };
-        let legend = Legend::Classes(vec![(2, "ground", [200, 0, 0])]);
+        let ground = LegendClass { color: [200, 0, 0], ..LegendClass::new(2, 9) };
+        let legend = Legend::Classes(vec![ground]);
         let mut image = Image::new(400, 300);
         image.coverage.fill(1.0);
         for y in 0..150 {

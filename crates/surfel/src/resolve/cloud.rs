@@ -1,5 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
+use super::crop_hints::outside_hint;
 use crate::crs::{is_in_degrees, move_to_metres, report_degrees};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings, with_nearest};
 use crate::error::{Error, Result};
@@ -74,11 +75,12 @@ fn import_from_file(
         load_options.filter = None;
     }
     let loaded = if settings.preparation.vertices() {
-        let Loaded { cloud, info } = surfel_formats::load(file, &load_options, progress)?;
-        (graph_of(cloud), info)
+        surfel_formats::load(file, &load_options, progress)
+            .map(|Loaded { cloud, info }| (graph_of(cloud), info))
     } else {
-        surfel_formats::load_graph(file, &load_options, progress)?
+        surfel_formats::load_graph(file, &load_options, progress)
     };
+    let loaded = loaded.map_err(|error| reading_error(error, &settings.preparation))?;
     progress.end();
     Ok(loaded)
 }
@@ -200,14 +202,33 @@ fn kept_points(
         n_kept = kept.iter().filter(|is_kept| **is_kept).count();
         progress.note(&format!("{n_kept} of {points} meet {}", filter.describe()));
         if n_kept == 0 {
-            return Err(no_point_kept(&[], Some(key), &filter));
+            return Err(no_point_kept(&[], Some(key), &filter, String::new()));
         }
     }
     Ok(Some(kept))
 }
 
-fn no_point_kept(files: &[PathBuf], key: Option<&'static str>, filter: &PointFilter) -> Error {
-    Error::NoPointKept { files: files.to_vec(), key, filter: filter.to_string() }
+fn no_point_kept(
+    files: &[PathBuf],
+    key: Option<&'static str>,
+    filter: &PointFilter,
+    hint: String,
+) -> Error {
+    Error::NoPointKept { files: files.to_vec(), key, filter: filter.to_string(), hint }
+}
+
+/// Returns the error of points that were read under settings; that of a filter names the setting that it is of.
+pub fn reading_error(error: surfel_formats::Error, settings: &PreparationSettings) -> Error {
+    let surfel_formats::Error::Core(cause @ surfel_core::Error::UnknownName { found, .. }) = &error
+    else {
+        return error.into();
+    };
+    let filters = settings.point_filters().unwrap_or_default();
+    let mut filters = filters.into_iter();
+    match filters.find(|(_, filter)| filter.columns().contains(&found.as_str())) {
+        Some((key, _)) => Error::Unfit(format!("{} [{key}]", with_nearest(cause))),
+        None => error.into(),
+    }
 }
 
 /// Returns a cloud in the coordinates of its file: those of a node may be others.
@@ -234,7 +255,7 @@ pub fn check_empty(files: &[PathBuf], settings: &PreparationSettings) -> Result<
     let Some(filter) = settings.point_filter()? else { return Ok(()) };
     let keys: Vec<&str> = settings.point_filters()?.into_iter().map(|(key, _)| key).collect();
     let key = if let [key] = keys[..] { Some(key) } else { None };
-    Err(no_point_kept(files, key, &filter))
+    Err(no_point_kept(files, key, &filter, outside_hint(settings.crop.as_ref(), files)))
 }
 
 /// Returns true if a cloud has the values of a colour source, or gets them when it is prepared.

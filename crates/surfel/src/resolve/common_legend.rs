@@ -4,7 +4,21 @@ use super::loaded::LoadedScene;
 use crate::description::SceneDescription;
 use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
-use surfel_core::scene::color::{Legend, legend};
+use surfel_core::scene::color::{Legend, choose_source, legend};
+
+/// Returns true if a legend explains the colours of a shown cloud.
+pub fn has_legend(
+    scene: &LoadedScene,
+    clouds: &[PreparedCloud],
+    description: &SceneDescription,
+) -> bool {
+    let mut geometries = scene.clouds().map(|(i, _)| i).zip(clouds);
+    geometries.any(|(i, cloud)| {
+        let stated = scene.settings_of(i, description).color.color;
+        let source = stated.unwrap_or_else(|| choose_source(cloud).0);
+        scene.is_shown(i, description) && source.has_legend()
+    })
+}
 
 /// Returns the legend of the first shown cloud that has one, by the settings of its object. Legends of classes, and
 /// those of labels of one name, are joined.
@@ -23,8 +37,12 @@ pub fn common_legend(
     let joined = legends.reduce(|first, other| match (first, other) {
         (Legend::Classes(mut classes), Legend::Classes(others)) => {
             classes.extend(others);
-            classes.sort_unstable();
-            classes.dedup();
+            classes.sort_unstable_by_key(|row| row.class);
+            classes.dedup_by(|later, first| {
+                let is_same = later.class == first.class;
+                first.n_points += if is_same { later.n_points } else { 0 };
+                is_same
+            });
             Legend::Classes(classes)
         }
         (
@@ -76,7 +94,7 @@ mod tests {
 
     fn classes(legend: Legend) -> Vec<u8> {
         match legend {
-            Legend::Classes(classes) => classes.iter().map(|(class, ..)| *class).collect(),
+            Legend::Classes(classes) => classes.iter().map(|row| row.class).collect(),
             other => panic!("{other:?}"),
         }
     }
@@ -101,6 +119,8 @@ mod tests {
     fn classes_of_all_clouds_are_listed() {
         let plain = json!({});
         let found = legend_of("class", &[plain.clone(), plain.clone(), plain], &[9, 2, 6]);
+        let Legend::Classes(rows) = &found else { panic!("{found:?}") };
+        assert_eq!(rows.iter().map(|row| row.n_points).collect::<Vec<_>>(), [163, 40, 40]);
         assert_eq!(classes(found), [2, 6, 9]);
     }
 }

@@ -1,5 +1,6 @@
 //! Turns a description into a scene that can be rendered: opens files and makes every automatic choice.
 
+mod crop_hints;
 mod cloud;
 mod camera;
 mod interior;
@@ -27,14 +28,15 @@ pub use camera::{
     SceneCamera, camera_motion, choose_camera, choose_up, short_position, up_convention,
 };
 pub use check_files::check_files;
-pub(crate) use cloud::filter_cloud;
 pub use cloud::{
     can_be_colored, check_empty, prepare_cloud, report_denoise, report_normals, report_prepared,
     report_radii, state_known_sides,
 };
-pub(crate) use common_legend::common_legend;
+pub(crate) use cloud::{filter_cloud, reading_error};
+pub(crate) use common_legend::{common_legend, has_legend};
 pub(crate) use common_range::with_common_ranges;
-pub(crate) use exposure::automatic_exposure;
+pub(crate) use crop_hints::report_crossing_rings;
+pub(crate) use exposure::{Metering, automatic_exposure};
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
 pub(crate) use loaded::{report_unused_of_files, report_unused_structure};
@@ -55,7 +57,7 @@ use camera::SceneExtent;
 use complete_description::{common_color, complete_description};
 use inside::{Inside, choose_inside};
 use interior::{choose_room, has_splats, hidden_ceiling, hidden_walls};
-use plan::frame_plan;
+use plan::{WholePlan, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::stand_at_station;
@@ -96,6 +98,7 @@ pub struct Resolved {
     pub(crate) system: Option<CoordinateSystem>,
     /// The world's up.
     pub(crate) up: Vec3,
+    pub(crate) metering: Metering,
 }
 
 /// Opens the files of a description and makes every choice that it leaves open.
@@ -132,6 +135,8 @@ pub struct AutoSettings {
     pub hidden_walls: Vec<ClipPlane>,
     /// The room on a turntable, whose walls before the camera each frame hides.
     pub turned_room: Option<Room>,
+    /// The whole of a plan.
+    pub(crate) whole_plan: Option<WholePlan>,
     /// The description, with the chosen surface, colours, plan and lights written into it.
     description: SceneDescription,
 }
@@ -156,7 +161,7 @@ impl AutoSettings {
         choose_color(scene, &mut chosen, progress);
         progress.check()?;
         let bounds = inlier_bounds(&points);
-        frame_plan(scene, &mut chosen, (&points, bounds), up, progress)?;
+        let whole_plan = frame_plan(scene, &mut chosen, (&points, bounds), up, progress)?;
         let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
         stand_sun_at_date(scene, &mut chosen, middle, up, progress)?;
         report_gaps(&points, progress);
@@ -192,7 +197,8 @@ impl AutoSettings {
         chosen = choose_lights(&chosen, &context, progress);
         choose_point_size(scene, &mut chosen, &points, &camera.camera, progress);
         let lights = lights(&chosen, scene.environment.as_ref(), up, has_normals)?;
-        Ok(Self { up, camera, lights, hidden_walls, turned_room, description: chosen })
+        let description = chosen;
+        Ok(Self { up, camera, lights, hidden_walls, turned_room, whole_plan, description })
     }
 
     /// Returns a description with the colours that were chosen for all clouds.
@@ -226,10 +232,13 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<Resolved> {
         let complete = auto.complete_description(&self);
-        let AutoSettings { up, camera, lights, description, hidden_walls, turned_room } = auto;
+        let AutoSettings { up, camera, lights, description, hidden_walls, turned_room, whole_plan } =
+            auto;
         check_camera(&description, &camera.at(0.0, &self.graph), up)?;
         let clouds = self.take_prepared(&description, progress)?;
         let description = with_common_ranges(&self, &clouds, &description, up, progress);
+        let has_legend = has_legend(&self, &clouds, &description);
+        let metering = Metering { plan: whole_plan, has_legend };
         let legend = match description.picture.legend() {
             true => common_legend(&self, &clouds, &description, up),
             false => Legend::None,
@@ -260,6 +269,7 @@ impl LoadedScene {
             overlay,
             system,
             up,
+            metering,
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::camera::stated_direction;
 use super::loaded::LoadedScene;
 use crate::crs::{CoordinateSystem, Unit};
-use crate::description::{CameraSettings, Invalid, OrthographicHeight, SceneDescription};
+use crate::description::{CameraSettings, Invalid, SceneDescription};
 use crate::error::Result;
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, is_valid_position};
@@ -28,7 +28,16 @@ pub fn coordinate_system(
     }
 }
 
-/// Writes the camera and the resolution of a plan into a description that asks for one.
+/// The whole of a plan, of which a picture may show a sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct WholePlan {
+    /// The camera that shows all points, straight above their middle if it looks down.
+    pub camera: Camera,
+    /// Width and height in pixels of the plan.
+    pub size: [f64; 2],
+}
+
+/// Writes the camera and the resolution of a plan into a description that asks for one, and returns the plan of all points.
 ///
 /// The edges of the picture lie on multiples of a pixel, so that plans of the same scene tile.
 ///
@@ -41,20 +50,21 @@ pub fn frame_plan(
     (points, bounds): (&PointCloud, Aabb),
     up: Vec3,
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<Option<WholePlan>> {
     if !description.plan.is_to_scale() {
-        return Ok(());
+        return Ok(None);
     }
     let unit = coordinate_system(scene, description).map_or(Unit::Unknown, |system| system.unit());
     let key = if description.plan.gsd.is_some() { "gsd" } else { "scale" };
     let degrees =
         || Invalid::at(key, "the coordinates are degrees of longitude and latitude, not lengths");
     let metres = unit.metres().ok_or_else(degrees)?;
-    let Some(pixel_size) = description.plan.pixel_size(metres) else { return Ok(()) };
+    let Some(pixel_size) = description.plan.pixel_size(metres) else { return Ok(None) };
     let camera = plan_camera(&description.camera, (points, bounds), up);
+    let whole = Window::around(&camera, (points, bounds), pixel_size);
     let window = match description.picture.resolution {
         Some(resolution) => Window::about(&camera, resolution, pixel_size),
-        None => Window::around(&camera, (points, bounds), pixel_size),
+        None => whole,
     };
     let (width, height) = window.resolution().filter(|_| pixel_size.is_normal()).ok_or_else(|| {
         let [width, height] = window.size;
@@ -75,7 +85,8 @@ pub fn frame_plan(
     }
     description.picture.resolution = Some((width, height));
     description.camera = window.camera_settings(&description.camera, &camera);
-    scene.check_memory(description)
+    scene.check_memory(description)?;
+    Ok(Some(WholePlan { camera: whole.camera(&camera), size: whole.size }))
 }
 
 /// Returns where the pixels of a height map lie: where those of the picture do, if the scene has a surface and the camera
@@ -137,6 +148,7 @@ fn is_within(bounds: Aabb, point: Vec3) -> bool {
 }
 
 /// The part of the world that a plan shows, in pixels along the right and the up of its camera.
+#[derive(Clone, Copy)]
 struct Window {
     left: f64,
     top: f64,
@@ -207,6 +219,12 @@ impl Window {
 
     /// Returns the settings of a camera that shows the window.
     fn camera_settings(&self, settings: &CameraSettings, camera: &Camera) -> CameraSettings {
+        let CameraSettings { lock, interior, .. } = *settings;
+        CameraSettings { lock, interior, ..CameraSettings::of(&self.camera(camera)) }
+    }
+
+    /// Returns the camera moved to show the window.
+    fn camera(&self, camera: &Camera) -> Camera {
         let [right, up, _] = camera.axes();
         let x = self.pixel_size * (self.left + 0.5 * self.size[0]);
         let y = self.pixel_size * (self.top - 0.5 * self.size[1]);
@@ -214,15 +232,11 @@ impl Window {
         // A camera that shows the window already stays as it is, bit by bit.
         let is_there = shift.iter().all(|shift| shift.abs() < 1e-6 * self.pixel_size);
         let shift = if is_there { DVec3::ZERO } else { shift[0] * right + shift[1] * up };
-        let height = self.pixel_size * self.size[1];
-        CameraSettings {
-            position: Some(camera.position + shift),
-            focal_point: Some(camera.focal_point + shift),
-            view_up: Some(camera.view_up),
-            orthographic: Some(OrthographicHeight::Fixed(height)),
-            lock: settings.lock,
-            interior: settings.interior,
-            ..CameraSettings::default()
+        Camera {
+            position: camera.position + shift,
+            focal_point: camera.focal_point + shift,
+            projection: Projection::Orthographic { height: self.pixel_size * self.size[1] },
+            ..*camera
         }
     }
 }

@@ -109,6 +109,16 @@ pub fn is_label(name: &str) -> bool {
     LABELS.contains(&plain.strip_prefix("scalar").unwrap_or(&plain))
 }
 
+/// Columns of LAS files by their names in PDAL, where these are other words.
+const NAMES_OF_PDAL: [(&str, &str); 3] =
+    [("scananglerank", "scan_angle"), ("infrared", "nir"), ("scanchannel", "scanner_channel")];
+
+/// Returns the name of the column of LAS files that has this name in PDAL, if that is another word.
+pub fn name_of_pdal(name: &str) -> Option<&'static str> {
+    let plain = plain_name(name);
+    NAMES_OF_PDAL.iter().find(|(of_pdal, _)| *of_pdal == plain).map(|(_, name)| *name)
+}
+
 /// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
 pub fn plain_name(name: &str) -> String {
     name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()

@@ -24,8 +24,8 @@ pub enum Legend {
         /// sRGB-encoded colours of values in equal steps from `low` to `high`.
         colors: Vec<[u8; 3]>,
     },
-    /// The classes of the cloud in ascending order, each with its name and sRGB-encoded colour.
-    Classes(Vec<(u8, &'static str, [u8; 3])>),
+    /// The classes of the cloud in ascending order.
+    Classes(Vec<LegendClass>),
     /// Labels of a column in ascending order.
     Labels {
         /// Name of the column.
@@ -33,6 +33,26 @@ pub enum Legend {
         /// Numbers with their sRGB-encoded colours.
         entries: Vec<(i64, [u8; 3])>,
     },
+}
+
+/// A class of a legend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LegendClass {
+    /// Number of the class.
+    pub class: u8,
+    /// Name of the class.
+    pub name: &'static str,
+    /// sRGB-encoded colour.
+    pub color: [u8; 3],
+    /// Number of the points of the class; 0 where it is not known.
+    pub n_points: u64,
+}
+
+impl LegendClass {
+    /// A class with its name and colour.
+    pub fn new(class: u8, n_points: u64) -> Self {
+        Self { class, name: class_name(class), color: class_color(class), n_points }
+    }
 }
 
 /// Number of colours in the legend of a map.
@@ -69,10 +89,10 @@ pub fn legend(cloud: &PointCloud, coloring: &Coloring) -> Result<Legend> {
 }
 
 fn classes_of(classes: &[u8]) -> Legend {
-    let mut is_present = [false; 256];
-    classes.iter().for_each(|class| is_present[usize::from(*class)] = true);
-    let present = (0..=u8::MAX).filter(|class| is_present[usize::from(*class)]);
-    Legend::Classes(present.map(|class| (class, class_name(class), class_color(class))).collect())
+    let mut n_points = [0; 256];
+    classes.iter().for_each(|class| n_points[usize::from(*class)] += 1);
+    let present = (0..=u8::MAX).zip(n_points).filter(|(_, n_points)| 0 < *n_points);
+    Legend::Classes(present.map(|(class, n_points)| LegendClass::new(class, n_points)).collect())
 }
 
 fn steps_of(mapping: &Mapping, title: String) -> Legend {
@@ -138,7 +158,13 @@ mod tests {
 
     #[test]
     fn the_legend_of_classes_has_their_names_and_colors() {
-        let expected = [2, 6, 200].map(|class| (class, class_name(class), class_color(class)));
+        let expected = [(2, "ground", 334), (6, "building", 333), (200, "user definable", 334)];
+        let expected = expected.map(|(class, name, n_points)| LegendClass {
+            class,
+            name,
+            color: class_color(class),
+            n_points,
+        });
         let found = legend(&ladder(), &coloring("class")).unwrap();
         assert_eq!(found, Legend::Classes(expected.to_vec()));
     }

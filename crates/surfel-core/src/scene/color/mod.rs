@@ -11,7 +11,7 @@ mod legend;
 
 pub use choose::choose_source;
 pub use coloring::Coloring;
-pub use legend::{Legend, legend};
+pub use legend::{Legend, LegendClass, legend};
 pub use mapping::common_range;
 pub use source::{ColorSource, parse_hex};
 pub use support::SupportColors;

@@ -1,6 +1,7 @@
 //! Warnings of settings that change nothing in the scene or in the file of its picture.
 
 use super::super::cloud::surface_of;
+use super::super::crop_hints::report_crossing_rings;
 use super::LoadedScene;
 use crate::description::{
     ColorSettings, KeyedSettings, LightKind, ObjectSettings, PreparationSettings, SceneDescription,
@@ -36,6 +37,8 @@ impl LoadedScene {
         }
         let preparation = &description.objects_default.preparation;
         report_unused_of_files(&self.file_infos, preparation, progress);
+        let of_objects = description.objects.iter().map(|object| &object.settings.preparation);
+        report_crossing_rings(of_objects.chain([preparation]), progress);
         self.report_unused_of_points(description, progress);
         self.report_unused_structure(description, progress);
         self.report_unused_of_surfaces(description, progress);

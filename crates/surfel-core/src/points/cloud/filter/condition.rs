@@ -102,8 +102,11 @@ impl fmt::Display for Condition {
             Self::All(parts) => Self::fmt_parts(parts, "&&", f),
             Self::Any(parts) => Self::fmt_parts(parts, "||", f),
             Self::Not(inner) => {
-                f.write_str("!")?;
-                inner.fmt_single(f)
+                if matches!(**inner, Self::Not(_)) {
+                    write!(f, "!{inner}")
+                } else {
+                    write!(f, "!({inner})")
+                }
             }
             Self::Within(polygons) if polygons.len() == 1 => {
                 f.write_str("(x, y) inside of a polygon")

@@ -2,7 +2,7 @@
 
 use super::condition::{Condition, Operand, Relation};
 use crate::error::{Error, Result};
-use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values};
+use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values, name_of_pdal};
 use std::ops::Range;
 
 /// The greatest channel of a colour of 8 bits. A channel that is compared with a greater number has 16 bits.
@@ -192,7 +192,9 @@ fn widen<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {
 fn find_column<'a>(name: &str, cloud: &'a PointCloud) -> Result<ColumnValues<'a>> {
     let wanted = plain(name);
     let scalars = cloud.scalars.iter();
-    if let Some(scalar) = scalars.clone().find(|scalar| plain(&scalar.name) == wanted) {
+    let scalar = |wanted: &str| scalars.clone().find(|scalar| plain(&scalar.name) == wanted);
+    let found = scalar(&wanted).or_else(|| scalar(&plain(name_of_pdal(name)?)));
+    if let Some(scalar) = found {
         return Ok(ColumnValues::Scalar(&scalar.values));
     }
     let known = KnownColumn::from_name(name).filter(|column| is_present(*column, cloud));

@@ -4,8 +4,10 @@ mod condition;
 mod parse;
 mod evaluate;
 mod polygon;
+mod crossing;
 
 use condition::{Condition, Operand, Relation};
+pub use crossing::rings_cross;
 pub use evaluate::visit_column;
 use evaluate::{Evaluation, color_range};
 pub(crate) use polygon::Polygon;
@@ -25,8 +27,10 @@ const POINTS_PER_BLOCK: usize = 1 << 11;
 /// A condition on the columns of a point, as in `classification == 2 && z < 1200`.
 ///
 /// Columns are compared with numbers and with each other by `==`, `!=`, `<`, `<=`, `>` and `>=`, and joined by `&&`,
-/// `||`, `!` and parentheses. PDAL's ranges are understood too: `z[0:100)` means `z >= 0 && z < 100`. Names of columns
-/// are those of the file; case and separators do not matter. `x`, `y` and `z` are world coordinates. Colours go from 0 to
+/// `||`, `!` and parentheses. The classification is also compared with names, as in `class == ground`. PDAL's ranges are
+/// understood too: `z[0:100)` means `z >= 0 && z < 100`, `z![0:100]` all other points, and in a list with commas a point
+/// is within one range of each column. Names of columns are those of the file, or those of PDAL for LAS; case and
+/// separators do not matter. `x`, `y` and `z` are world coordinates. Colours go from 0 to
 /// 255; if a number above 255 is compared with them, they go from 0 to 65535.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointFilter {
@@ -194,6 +198,46 @@ mod tests {
         assert_eq!(kept("Z(1000:1002]"), [1, 2]);
         assert_eq!(kept("Z[1002:]"), [2, 3]);
         assert_eq!(kept("!Classification[:2]"), [1, 3]);
+        assert_eq!(kept("Classification![2:2]"), [1, 3]);
+        assert_eq!(kept("Z!(1000:1002]"), [0, 3]);
+    }
+
+    #[test]
+    fn ranges_of_one_column_are_alternatives_and_others_hold_together() {
+        assert_eq!(kept("Classification[2:2],Classification[6:6]"), [0, 1, 2]);
+        assert_eq!(kept("Classification[2:2], class[6:6], Z[1001:]"), [1, 2]);
+        assert_eq!(kept("Z[1001:], Classification[2:2], Z[:1000], Classification[6:6]"), [0, 1, 2]);
+        // As in PDAL, each of two negated ranges lets through what the other excludes.
+        assert_eq!(kept("Classification![2:2],Classification![6:6]"), [0, 1, 2, 3]);
+        let filter: PointFilter = "Classification![7:7],Z(1:2)".parse().unwrap();
+        let text = filter.to_string();
+        assert_eq!(text, "!(Classification >= 7 && Classification <= 7) && (Z > 1 && Z < 2)");
+    }
+
+    #[test]
+    fn negated_comparisons_are_written_in_parentheses() {
+        let written = |filter: &str| filter.parse::<PointFilter>().unwrap().to_string();
+        assert_eq!(written("!(z<3)"), "!(z < 3)");
+        assert_eq!(written("!!z<3"), "!!(z < 3)");
+        assert_eq!(written("not z[3:]"), "!(z >= 3)");
+    }
+
+    #[test]
+    fn classes_are_compared_by_name() {
+        assert_eq!(kept("class == ground"), [0, 2]);
+        assert_eq!(kept("Building == Classification || class == high_vegetation"), [1, 3]);
+        assert_eq!(kept("class != ground"), [1, 3]);
+        let filter: PointFilter = "z == ground".parse().unwrap();
+        assert!(filter.matches(&cloud(), 0).unwrap_err().to_string().contains("'ground'"));
+    }
+
+    #[test]
+    fn columns_of_las_have_their_names_in_pdal() {
+        let angles =
+            Scalar { name: "scan_angle".into(), values: Values::F32(vec![-5.0, 0.0, 5.0, 9.0]) };
+        let cloud = PointCloud { scalars: vec![angles], ..cloud() };
+        let filter: PointFilter = "ScanAngleRank[0:5]".parse().unwrap();
+        assert_eq!(filter.matches(&cloud, 0).unwrap(), [false, true, true, false]);
     }
 
     #[test]

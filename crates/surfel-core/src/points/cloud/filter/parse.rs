@@ -1,7 +1,9 @@
-//! Parses conditions: comparisons joined by `&&`, `||`, `!` and parentheses, and PDAL's ranges.
+//! Parses conditions: comparisons joined by `&&`, `||`, `!` and parentheses, and PDAL's ranges and lists of them.
 
 use super::condition::{Condition, Operand, RELATIONS, Relation};
 use crate::error::{Error, Result};
+use crate::image::class_named;
+use crate::points::{KnownColumn, plain_name};
 
 /// Maximum depth of parentheses and negations, far below what the stack takes.
 const MAX_DEPTH: usize = 100;
@@ -9,7 +11,11 @@ const MAX_DEPTH: usize = 100;
 /// Parses a condition.
 pub(super) fn parse(text: &str) -> Result<Condition> {
     let mut parser = Parser { text, at: 0, depth: 0 };
-    let condition = parser.any()?;
+    let mut condition = parser.any()?;
+    if parser.peek(",") {
+        parser.at = 0;
+        condition = parser.ranges()?;
+    }
     parser.skip_spaces();
     if parser.at < text.len() {
         return Err(parser.fail("&&, || or the end"));
@@ -24,6 +30,29 @@ struct Parser<'a> {
 }
 
 impl<'a> Parser<'a> {
+    /// Parses ranges joined by commas, as the filter `filters.range` of PDAL: a point is within one range of each column.
+    fn ranges(&mut self) -> Result<Condition> {
+        let mut by_column: Vec<(String, Vec<Condition>)> = Vec::new();
+        loop {
+            let column = match self.operand()? {
+                Operand::Column(name) if self.begins_range() => name,
+                _ => return Err(self.fail("a range as in Z[0:10], as commas join nothing else")),
+            };
+            let known = KnownColumn::from_name(&column);
+            let key = known.map_or_else(|| plain_name(&column), |known| known.name().to_owned());
+            let range = self.range(&Operand::Column(column))?;
+            match by_column.iter_mut().find(|(other, _)| *other == key) {
+                Some((_, ranges)) => ranges.push(range),
+                None => by_column.push((key, vec![range])),
+            }
+            if !self.take(",") {
+                break;
+            }
+        }
+        let parts = by_column.into_iter().map(|(_, ranges)| Condition::Any(ranges));
+        Ok(Condition::All(parts.collect()))
+    }
+
     fn any(&mut self) -> Result<Condition> {
         let mut parts = vec![self.all()?];
         while self.take("||") || self.take_word("or") {
@@ -41,12 +70,14 @@ impl<'a> Parser<'a> {
     }
 
     fn single(&mut self) -> Result<Condition> {
+        self.check_depth(1)?;
         self.depth += 1;
-        if MAX_DEPTH < self.depth {
-            return Err(self.fail("fewer parentheses"));
-        }
         let condition = if self.take("!") || self.take_word("not") {
-            Condition::Not(Box::new(self.single()?))
+            let inner = self.single()?;
+            if matches!(inner, Condition::Compare(..)) {
+                self.check_depth(2)?;
+            }
+            Condition::Not(Box::new(inner))
         } else if self.take("(") {
             let inner = self.any()?;
             if !self.take(")") {
@@ -62,18 +93,40 @@ impl<'a> Parser<'a> {
 
     fn comparison(&mut self) -> Result<Condition> {
         let left = self.operand()?;
-        if matches!(left, Operand::Column(_)) && (self.peek("[") || self.peek("(")) {
+        if matches!(left, Operand::Column(_)) && self.begins_range() {
             return self.range(&left);
         }
         let relation = RELATIONS.into_iter().find(|(sign, _)| self.take(sign));
         let Some((_, relation)) = relation else {
             return Err(self.fail("==, !=, <, <=, > or >="));
         };
-        Ok(Condition::Compare(left, relation, self.operand()?))
+        let right = self.operand()?;
+        let is_equality = matches!(relation, Relation::Equal | Relation::NotEqual);
+        Ok(match (&left, &right) {
+            (Operand::Column(column), Operand::Column(name)) if is_equality => {
+                match (class_of(column, name), class_of(name, column)) {
+                    (Some(class), _) => Condition::Compare(left, relation, class),
+                    (_, Some(class)) => Condition::Compare(class, relation, right),
+                    _ => Condition::Compare(left, relation, right),
+                }
+            }
+            _ => Condition::Compare(left, relation, right),
+        })
     }
 
-    /// Parses the bounds of a range: brackets include the bound, parentheses exclude it, and either may be absent.
+    /// Returns true if the bounds of a range come next, or `!` before them.
+    fn begins_range(&mut self) -> bool {
+        ["[", "(", "![", "!("].into_iter().any(|sign| self.peek(sign))
+    }
+
+    /// Parses the bounds of a range: brackets include the bound, parentheses exclude it, and either may be absent. Behind
+    /// `!` the range is what lies outside of them.
     fn range(&mut self, column: &Operand) -> Result<Condition> {
+        if self.take("!") {
+            let inside = self.range(column)?;
+            self.check_depth(2)?;
+            return Ok(Condition::Not(Box::new(inside)));
+        }
         let above = if self.take("[") { Relation::GreaterOrEqual } else { Relation::Greater };
         self.take("(");
         let mut parts = Vec::new();
@@ -97,11 +150,14 @@ impl<'a> Parser<'a> {
         if parts.is_empty() {
             return Err(self.fail("a range with a bound before it"));
         }
-        // Two bounds are written back in parentheses.
-        if self.depth == MAX_DEPTH {
-            return Err(self.fail("fewer parentheses"));
-        }
+        self.check_depth(1)?;
         Ok(Condition::All(parts))
+    }
+
+    /// Fails unless so many more parentheses and negations are within the limit, as they are written back: around two
+    /// bounds, and around what is negated.
+    fn check_depth(&self, n_more: usize) -> Result<()> {
+        if self.depth + n_more <= MAX_DEPTH { Ok(()) } else { Err(self.fail("fewer parentheses")) }
     }
 
     fn operand(&mut self) -> Result<Operand> {
@@ -179,6 +235,13 @@ impl<'a> Parser<'a> {
     }
 }
 
+/// Returns the number of the class of this name, if it is compared with the classification.
+fn class_of(column: &str, name: &str) -> Option<Operand> {
+    let is_class = KnownColumn::from_name(column) == Some(KnownColumn::Classification);
+    let class = class_named(name).filter(|_| is_class)?;
+    Some(Operand::Number(class.into()))
+}
+
 #[cfg(test)]
 mod tests {
     //! Broken filters, and the place that their errors name.
@@ -199,6 +262,9 @@ mod tests {
         assert!(message("z[3]").contains("`:` between the bounds"));
         assert!(message("z[3:4").contains("`]` or `)`"));
         assert!(message("z[:]").contains("a range with a bound"));
+        assert!(message("z[0:1], z < 3").contains("character 11: found `<`, expected a range as"));
+        assert!(message("z[0:1],").contains("found the end"));
+        assert!(message("z ! 3").contains("expected ==, !="));
         assert!(message("z < 1e999").contains("found `1e999`"));
         assert!(message(&"(".repeat(1000)).contains("fewer parentheses"));
         assert!(message(&"!".repeat(1000)).contains("fewer parentheses"));
@@ -206,7 +272,7 @@ mod tests {
 
     #[test]
     fn the_deepest_conditions_are_written_back_readably() {
-        for deepest in ["!".repeat(MAX_DEPTH - 1) + "x == 1", "!".repeat(MAX_DEPTH - 2) + "x[1:2]"]
+        for deepest in ["x == 1", "x[1:2]", "x[1:]"].map(|inner| "!".repeat(MAX_DEPTH - 2) + inner)
         {
             let written = parse(&deepest).unwrap().to_string();
             assert_eq!(parse(&written).unwrap().to_string(), written);

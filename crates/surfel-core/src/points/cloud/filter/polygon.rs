@@ -40,16 +40,16 @@ impl Side {
 
 /// Ranges of Y by the strips of equal height that they reach into.
 #[derive(Clone, Debug, PartialEq)]
-struct Strips {
+pub(super) struct Strips {
     /// Least and greatest Y of all ranges.
     y_range: [f64; 2],
     /// Indices of the ranges that reach into each strip.
-    indices: Vec<Vec<u32>>,
+    pub indices: Vec<Vec<u32>>,
 }
 
 impl Strips {
     /// Sorts ranges into strips. Those whose end lies below their start are in none.
-    fn new(ranges: &[[f64; 2]]) -> Self {
+    pub fn new(ranges: &[[f64; 2]]) -> Self {
         let filled = || ranges.iter().filter(|[low, high]| low <= high);
         let low = filled().map(|[low, _]| *low).fold(f64::INFINITY, f64::min);
         let high = filled().map(|[_, high]| *high).fold(f64::NEG_INFINITY, f64::max);
