@@ -43,8 +43,8 @@ const MIN_SAME_FACE: f32 = 0.985;
 const MAX_EDGE: f32 = 0.94;
 /// Distance from the plane of another face, in standard deviations, of the points that tell which side is inside, and the
 /// ratio of their numbers on both sides.
-const CLEARLY_BESIDE: f32 = 1.5;
-const MIN_INSIDE_RATIO: usize = 3;
+const CLEARLY_BESIDE: f32 = 2.0;
+const MIN_INSIDE_RATIO: usize = 2;
 
 /// The plane of a flat face.
 #[derive(Clone, Copy)]
