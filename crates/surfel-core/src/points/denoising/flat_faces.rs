@@ -395,6 +395,23 @@ mod tests {
     }
 
     #[test]
+    fn points_beyond_an_obtuse_edge_move_onto_it() {
+        let mut random = Random::new(6, 0);
+        // The faces go down from the edge, which is the Y axis, with an angle of 130 degrees in between.
+        let (sin, cos) = 25f32.to_radians().sin_cos();
+        let points = (0..7200).map(|i| {
+            let (side, down) = ([-1.0, 1.0][i % 2], 60.0 * random.next_f32());
+            let point = Vec3::new(side * cos * down, 60.0 * random.next_f32(), -sin * down);
+            point + 0.6 * Vec3::from_array([(); 3].map(|()| random.next_gaussian() as f32))
+        });
+        let mut cloud = PointCloud::from_positions(points.collect());
+        denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap();
+        let above = |p: &&Vec3| 0.3 < p.z + sin / cos * p.x.abs() && (5.0..55.0).contains(&p.y);
+        let n_above = cloud.positions.iter().filter(above).count();
+        assert!(n_above < 14, "{n_above}");
+    }
+
+    #[test]
     fn a_wall_goes_on_behind_a_shelf() {
         let mut random = Random::new(5, 0);
         let mut noise = || 0.3 * random.next_gaussian() as f32;
