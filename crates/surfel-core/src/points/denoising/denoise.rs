@@ -7,13 +7,13 @@
 use super::depth_steps::DepthSteps;
 use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::{GROUP_SIZE, Noise};
+use super::plants::Plants;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
 use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
 use crate::points::normals::jets::fit_wide_jet;
 use crate::points::normals::planes::fit_plane;
-use crate::points::structure::above_land::is_above_land;
 use crate::points::structure::wall_faces::{Face, N_FACE_NEIGHBORS};
 use crate::points::up::is_mostly_land;
 use crate::progress::Progress;
@@ -118,12 +118,12 @@ pub fn denoise(
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
     let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
     let tree = KdTree::new(&sorted, progress)?;
-    let is_land = is_mostly_land(positions);
-    let noise_of_ground = noise.quantile(0.25);
+    let (is_land, states_normals) = (is_mostly_land(positions), cloud.normals.is_some());
+    let plants = Plants::find(&tree, noise.quantile(0.25), is_land, states_normals, progress)?;
     let count = |(point, noise): (usize, &Option<f32>)| {
         progress.check()?;
         let Some(noise) = *noise else { return Ok(0) };
-        if is_land && is_plant(&tree, point, noise_of_ground) {
+        if plants.contains(point) {
             return Ok(0);
         }
         Ok((NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS) as u32)
@@ -143,18 +143,6 @@ pub fn denoise(
     cloud.positions = moved_points;
     let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
     Ok(Some(Denoised { report, normals }))
-}
-
-/// True for a point above land: low plants look like noise of the ground, but are none. `noise` is that of the ground in
-/// spacings.
-fn is_plant(tree: &KdTree, point: usize, noise: f32) -> bool {
-    const N_NEIGHBORS: usize = 24;
-    /// Heights by noise alone, in multiples of it: planes through few noisy points err as much as the points do.
-    const SLACK: f32 = 2.0;
-    let positions = tree.positions();
-    let neighbors = tree.nearest(positions[point], N_NEIGHBORS, Some(point as u32));
-    let radius_in_spacings = (N_NEIGHBORS as f32 / std::f32::consts::PI).sqrt();
-    is_above_land(positions, point, &neighbors, SLACK * noise / radius_in_spacings)
 }
 
 /// Returns the means of groups of points that follow each other in `order`.

@@ -6,5 +6,6 @@
 pub mod depth_steps;
 pub mod flat_faces;
 pub mod noise;
+pub mod plants;
 pub mod denoise;
 pub mod line_axes;
