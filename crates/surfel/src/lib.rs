@@ -82,6 +82,7 @@ mod added_objects;
 mod point_overlap;
 mod thread_pools;
 pub mod live_view;
+mod live_trees;
 mod height_map;
 pub mod live_scene;
 pub mod live_film;

@@ -1,19 +1,18 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
 use crate::added_objects::{first_added, without_added};
-use crate::built_scene::{exposure_stops, planes_before, source_indices};
+use crate::built_scene::{exposure_stops, planes_before};
 use crate::cache::Lru2;
 use crate::crs::Unit;
 use crate::description::{Exposure, Interior, SceneDescription};
 use crate::error::Result;
-use crate::known_trees::KnownTrees;
+use crate::live_trees::{BuildCache, TreeSource};
 use crate::live_view::{LiveView, SceneTrees};
 use crate::picture::RenderedImage;
-use crate::point_overlap::check_overlap;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, Metering, common_legend,
-    coordinate_system, expose, finish_graph, hide_walls, render_settings, with_common_ranges,
+    AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, Metering, coordinate_system, expose,
+    render_settings,
 };
 use crate::scene_keys::{filter_key, grouping_key, preparation_key, tree_key};
 use crate::thread_pools::{lower_priority, start_threads};
@@ -21,12 +20,11 @@ use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
-use surfel_core::math::DVec3;
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::scene::ClipPlane;
 use surfel_core::scene::color::Legend;
-use surfel_core::scene::{Background, Camera, ClipPlane, Projection, Scene};
 use surfel_core::trace::Simd;
 
 /// A loaded scene that is shown under one description after another. Threads share it.
@@ -62,25 +60,6 @@ pub enum UseCase {
     Viewers,
     /// A program that makes one picture after another, each as `surfel render` would.
     Pictures,
-}
-
-/// Results for the last descriptions.
-#[derive(Debug, Default)]
-struct BuildCache {
-    prepared: Lru2<Vec<PreparedCloud>>,
-    /// The clouds of added objects, apart, so that all others need not be prepared again beside them.
-    prepared_added: Lru2<Vec<PreparedCloud>>,
-    trees: Lru2<SceneTrees>,
-    /// Trees of single geometries: those that a change leaves as they are need not be built again.
-    known_trees: KnownTrees,
-}
-
-impl BuildCache {
-    fn clear(&self) {
-        self.prepared.clear();
-        self.prepared_added.clear();
-        self.trees.clear();
-    }
 }
 
 impl LiveScene {
@@ -408,8 +387,8 @@ impl LiveScene {
         let trees = tree_key(description, preparation, auto, &frames);
         cache.trees.get_or_make(trees, progress, |progress| {
             let clouds = self.prepared(cache, loaded, description, progress)?;
-            let source =
-                TreeSource { loaded, time_secs, description, auto, use_case: self.use_case };
+            let limits_overlap = self.use_case == UseCase::Viewers;
+            let source = TreeSource { loaded, time_secs, description, auto, limits_overlap };
             let build = || source.build(clouds, &cache.known_trees, progress);
             self.preparation_threads.install(build)
         })
@@ -446,57 +425,8 @@ impl LiveScene {
     }
 }
 
-/// Everything besides prepared clouds that trees are built of.
-struct TreeSource<'a> {
-    loaded: &'a LoadedScene,
-    time_secs: f64,
-    description: &'a SceneDescription,
-    auto: &'a AutoSettings,
-    use_case: UseCase,
-}
-
-impl TreeSource<'_> {
-    fn build(
-        self,
-        clouds: Vec<PreparedCloud>,
-        known: &KnownTrees,
-        progress: &dyn Progress,
-    ) -> Result<SceneTrees> {
-        let Self { loaded, time_secs, description, auto, use_case } = self;
-        let up = auto.up;
-        let description = with_common_ranges(loaded, &clouds, description, up, progress);
-        let legend = common_legend(loaded, &clouds, &description, up);
-        let raw = loaded.graph_without_points();
-        let (mut graph, mut sequences) =
-            finish_graph(loaded, raw, clouds, &description, up, progress)?;
-        hide_walls(&mut graph, &auto.hidden_walls);
-        for sequence in &mut sequences {
-            sequence.seek(time_secs, &mut graph, up, progress)?;
-        }
-        let source_indices = source_indices(&graph);
-        let (lights, background) = (Vec::new(), Background::Transparent);
-        let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
-        if use_case == UseCase::Viewers {
-            check_overlap(&scene.graph)?;
-        }
-        let flat = known.build(&scene, progress)?;
-        progress.end();
-        let mut graph = scene.graph;
-        graph.release_static();
-        Ok(SceneTrees { graph, flat, source_indices, legend })
-    }
-}
-
 /// The parts of files that are kept: the viewer shows all columns of a point, which is told by its index.
 const KEEP: KeepOptions = KeepOptions { all_columns: true, source_indices: true };
-
-/// A camera for trees that nobody looks at yet.
-const PLACEHOLDER_CAMERA: Camera = Camera {
-    position: DVec3::ZERO,
-    focal_point: DVec3::Y,
-    view_up: DVec3::Z,
-    projection: Projection::Panorama,
-};
 
 #[cfg(test)]
 mod tests;
