@@ -4,21 +4,7 @@ use super::loaded::LoadedScene;
 use crate::description::SceneDescription;
 use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
-use surfel_core::scene::color::{Legend, choose_source, legend};
-
-/// Returns true if a legend explains the colours of a shown cloud.
-pub fn has_legend(
-    scene: &LoadedScene,
-    clouds: &[PreparedCloud],
-    description: &SceneDescription,
-) -> bool {
-    let mut geometries = scene.clouds().map(|(i, _)| i).zip(clouds);
-    geometries.any(|(i, cloud)| {
-        let stated = scene.settings_of(i, description).color.color;
-        let source = stated.unwrap_or_else(|| choose_source(cloud).0);
-        scene.is_shown(i, description) && source.has_legend()
-    })
-}
+use surfel_core::scene::color::{Legend, legend};
 
 /// Returns the legend of the first shown cloud that has one, by the settings of its object. Legends of classes, and
 /// those of labels of one name, are joined.

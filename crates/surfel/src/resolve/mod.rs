@@ -33,7 +33,7 @@ pub use cloud::{
     report_radii, state_known_sides,
 };
 pub(crate) use cloud::{filter_cloud, reading_error};
-pub(crate) use common_legend::{common_legend, has_legend};
+pub(crate) use common_legend::common_legend;
 pub(crate) use common_range::with_common_ranges;
 pub(crate) use crop_hints::report_crossing_rings;
 pub(crate) use exposure::{Metering, automatic_exposure};
@@ -237,12 +237,8 @@ impl LoadedScene {
         check_camera(&description, &camera.at(0.0, &self.graph), up)?;
         let clouds = self.take_prepared(&description, progress)?;
         let description = with_common_ranges(&self, &clouds, &description, up, progress);
-        let has_legend = has_legend(&self, &clouds, &description);
-        let metering = Metering { plan: whole_plan, has_legend };
-        let legend = match description.picture.legend() {
-            true => common_legend(&self, &clouds, &description, up),
-            false => Legend::None,
-        };
+        let legend = common_legend(&self, &clouds, &description, up);
+        let metering = Metering { plan: whole_plan, has_legend: legend != Legend::None };
         let raw = std::mem::take(&mut self.graph);
         let (mut graph, sequences) = finish_graph(&self, raw, clouds, &description, up, progress)?;
         hide_walls(&mut graph, &hidden_walls);

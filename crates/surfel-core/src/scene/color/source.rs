@@ -62,11 +62,6 @@ impl ColorSource {
         !matches!(self, Self::Rgb | Self::Class | Self::Normal | Self::Constant(_))
     }
 
-    /// True if a legend explains the colours: those of a colour map, and of classes.
-    pub fn has_legend(&self) -> bool {
-        self.is_mapped() || *self == Self::Class
-    }
-
     /// True if the values of the source are names of things rather than amounts, so that no value lies between two
     /// others: classes, labels and whole numbers.
     pub fn is_categorical(&self, cloud: &PointCloud) -> bool {
