@@ -5,7 +5,7 @@ use super::nearest::nearest_if_any;
 use super::rule::{Rule, as_list, expected};
 use serde_json::{Value, json};
 use std::path::Path;
-use surfel_core::image::class_name;
+use surfel_core::image::{class_name, class_named};
 use surfel_core::points::PointFilter;
 
 /// The returns of a laser pulse that are kept.
@@ -33,8 +33,7 @@ impl Rule<Vec<u8>> for Classes {
                 Value::String(text) => text.trim().to_lowercase(),
                 other => other.to_string(),
             };
-            let named = || (0..=u8::MAX).find(|class| class_name(*class) == text);
-            text.parse().ok().or_else(named).ok_or(text)
+            text.parse().ok().or_else(|| class_named(&text)).ok_or(text)
         };
         let invalid = |unknown: &str| {
             let advice = nearest_if_any(unknown, (0..=u8::MAX).map(class_name));
@@ -71,4 +70,22 @@ pub fn point_filters(
     let filters =
         [("filter", filter.cloned()), ("class", classes), ("returns", returns), ("crop", area)];
     filters.into_iter().filter_map(|(key, filter)| Some((key, filter?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! Names of classes.
+
+    use super::*;
+
+    #[test]
+    fn classes_have_the_names_that_filters_know() {
+        let read = |value: Value| Classes.read(&value, Path::new(""));
+        assert_eq!(read(json!("ground, Low_Vegetation,6")).unwrap(), [2, 3, 6]);
+        assert_eq!(read(json!([7, "building"])).unwrap(), [7, 6]);
+        // Many classes are reserved.
+        for unknown in ["reserved", "soil", ""] {
+            assert!(read(json!(unknown)).is_err(), "{unknown}");
+        }
+    }
 }
