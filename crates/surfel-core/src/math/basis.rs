@@ -1,6 +1,6 @@
-//! Orthonormal bases around a direction.
+//! Orthonormal bases around a direction, and the rotation in a linear map.
 
-use super::{Floats, Vec3, Vec3Lanes};
+use super::{DMat3, DQuat, DVec3, Floats, Vec3, Vec3Lanes};
 
 /// A right-handed orthonormal basis around a given third vector.
 #[derive(Clone, Copy, Debug)]
@@ -46,4 +46,15 @@ pub fn tangents<F: Floats>(normal: Vec3Lanes<F>) -> [Vec3Lanes<F>; 2] {
         z: zero - sign * normal.x,
     };
     [tangent, Vec3Lanes { x: b, y: sign + normal.y * normal.y * a, z: zero - normal.y }]
+}
+
+/// Returns the rotation of a linear map that may also scale, shear and mirror: its first axis keeps its direction, its
+/// second the plane. The identity if there is none.
+pub fn rotation_of(linear: &DMat3) -> DQuat {
+    let x = linear.x_axis.normalize_or_zero();
+    let z = x.cross(linear.y_axis).normalize_or_zero();
+    if z == DVec3::ZERO || !linear.is_finite() {
+        return DQuat::IDENTITY;
+    }
+    DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize()
 }

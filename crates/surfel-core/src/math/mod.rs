@@ -18,7 +18,7 @@ mod set_bits;
 mod slab;
 
 pub use aabb::Aabb;
-pub use basis::{Basis, tangents};
+pub use basis::{Basis, rotation_of, tangents};
 pub use distribution::Distribution2d;
 pub use doubled_lanes::DoubledLanes;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};

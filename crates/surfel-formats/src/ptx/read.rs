@@ -1,6 +1,6 @@
 //! Reads the points of PTX files to world coordinates.
 
-use surfel_core::math::{DMat3, DQuat, DVec3};
+use surfel_core::math::{DVec3, rotation_of};
 use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, ScanStation};
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
@@ -13,7 +13,7 @@ use crate::salvage::Salvage;
 use crate::stations::set_stations;
 use crate::table::{
     CloudBuilder, ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout,
-    RowRange, append_rows, parse_number, words_of,
+    RowRange, append_rows, parse_numbers,
 };
 
 /// Names of the last columns: the place of each point in the grid of its scan.
@@ -98,16 +98,6 @@ pub(crate) fn read(
     Ok(Loaded { cloud, info })
 }
 
-/// Returns the rotation of a transform, which may also scale.
-fn rotation_of(linear: &DMat3) -> DQuat {
-    let axes = [linear.x_axis, linear.y_axis].map(DVec3::try_normalize);
-    let rotation = match axes {
-        [Some(x), Some(y)] => DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y))),
-        _ => DQuat::IDENTITY,
-    };
-    if rotation.is_finite() { rotation.normalize() } else { DQuat::IDENTITY }
-}
-
 /// Returns the scans in words.
 fn describe(scans: &[Scan]) -> String {
     match scans {
@@ -163,9 +153,7 @@ fn parse_cell(
     n_columns: usize,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
-    for word in words_of(line) {
-        row.push(parse_number(word)?);
-    }
+    parse_numbers(line, row)?;
     if row.len() != scan.n_fields {
         let expected = format!("{} as in the scan's first line", scan.n_fields);
         return Err(LineError { found: counted(row.len(), "field"), expected });

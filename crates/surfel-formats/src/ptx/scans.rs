@@ -13,6 +13,9 @@ use crate::table::{MAX_LINE_LENGTH, parse_number, words_of};
 /// the transform.
 const N_HEADER_LINES: usize = 10;
 
+/// Bytes in which lines are counted between two checks for cancellation.
+const BYTES_PER_CHECK: usize = 1 << 22;
+
 /// A scan: a grid of cells, one to a line.
 #[derive(Clone, Debug)]
 pub(super) struct Scan {
@@ -147,16 +150,25 @@ fn read_scan_header(lines: &mut Lines) -> Result<Scan> {
 /// Returns the first byte after the cells of a scan.
 fn end_of_cells(lines: &Lines, scan: &Scan, progress: &dyn Progress) -> Result<usize> {
     let mut at = scan.start;
-    for cell in 0..scan.n_cells() {
-        if cell.is_multiple_of(1 << 16) {
-            progress.check()?;
+    let mut n_left = scan.n_cells();
+    while 0 < n_left {
+        progress.check()?;
+        let piece = &lines.input[at..lines.input.len().min(at + BYTES_PER_CHECK)];
+        let is_last = at + piece.len() == lines.input.len();
+        let has_unended_line = is_last && piece.last().is_some_and(|last| *last != b'\n');
+        let ends = memchr::memchr_iter(b'\n', piece);
+        let n_lines = ends.clone().count() as u64 + u64::from(has_unended_line);
+        if n_left <= n_lines {
+            let last = ends.clone().nth(n_left as usize - 1);
+            return Ok(at + last.map_or(piece.len(), |end| end + 1));
         }
-        let rest = &lines.input[at..];
-        if rest.is_empty() {
-            let location = Location::Line(scan.line + cell);
-            return Err(lines.input.truncated(location, cell, scan.n_cells()));
+        n_left -= n_lines;
+        at += piece.len();
+        if is_last {
+            let n_found = scan.n_cells() - n_left;
+            let location = Location::Line(scan.line + n_found);
+            return Err(lines.input.truncated(location, n_found, scan.n_cells()));
         }
-        at += memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
     }
     Ok(at)
 }

@@ -190,6 +190,24 @@ pub(crate) fn words_of(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
+/// Appends the numbers of a line between blanks.
+pub(crate) fn parse_numbers(line: &[u8], row: &mut Vec<f64>) -> std::result::Result<(), LineError> {
+    let mut rest = line.trim_ascii_start();
+    while !rest.is_empty() {
+        let is_word_end = |end| rest.get(end).is_none_or(u8::is_ascii_whitespace);
+        let (number, end) = match fast_float2::parse_partial(rest) {
+            Ok((number, end)) if is_word_end(end) => (number, end),
+            _ => {
+                let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+                (parse_number(&rest[..end])?, end)
+            }
+        };
+        row.push(number);
+        rest = rest[end..].trim_ascii_start();
+    }
+    Ok(())
+}
+
 /// Words that programs write for a missing number, in upper case; that of the C library of Windows is `-nan(ind)`.
 const MISSING: [&[u8]; 7] =
     [b"NA", b"N/A", b"NULL", b"NONE", b"-NAN(IND)", b"NAN(IND)", b"-NAN(SNAN)"];
@@ -274,7 +292,9 @@ fn parse_text(text: &[u8], first: u64, parse: ParseLine, rows: RowRange) -> Pars
             break;
         }
         debug_assert!(row.is_empty() || row.len() == n_columns, "a row is complete or empty");
-        parsed.records.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        for value in &row {
+            parsed.records.extend_from_slice(&value.to_le_bytes());
+        }
     }
     parsed
 }

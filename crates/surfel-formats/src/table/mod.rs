@@ -26,8 +26,8 @@ pub(crate) use encode::{
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_end::{FindEnd, find_line_end};
 pub(crate) use line_reader::{
-    LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, read_rows,
-    words_of,
+    LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, parse_numbers,
+    read_rows, words_of,
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{

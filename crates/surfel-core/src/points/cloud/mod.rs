@@ -9,6 +9,7 @@ pub mod color_bits;
 pub mod flags;
 pub mod known_column;
 pub mod gaussians;
+mod transform;
 pub mod filter;
 pub mod merge;
 pub mod density;
