@@ -25,7 +25,7 @@ pub struct Args {
     output: PathBuf,
     /// Adds normals. Normals and radii are both added if you choose no step: none of --normals, --normals-k,
     /// --normals-radius, --radius, --structure, --orient, --filter, --class, --returns, --crop, --duplicates, --noise-points,
-    /// --subsample, --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
+    /// --subsample, --mixed-pixels, --reproject, --remove-outliers, --denoise, --keep-variation.
     #[arg(long, help_heading = Section::Preparation.heading())]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.

@@ -26,6 +26,16 @@ pub enum Error {
         /// The renderer's error.
         cause: surfel_core::Error,
     },
+    /// The data lack the column that a setting asks for.
+    #[error("{}: {text} [{key}]", list_files(files))]
+    MissingColumn {
+        /// Files of the points.
+        files: Vec<PathBuf>,
+        /// Key of the setting.
+        key: &'static str,
+        /// The name that was found, and those that there are.
+        text: String,
+    },
     /// The data lack something that the description asks for.
     #[error("{0}")]
     Unfit(String),

@@ -214,6 +214,7 @@ fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
         || preparation.duplicates.is_some()
         || preparation.noise_points.is_some()
         || preparation.mixed_pixels.is_some()
+        || preparation.reproject.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
     if !columns.any() && !has_other_steps {

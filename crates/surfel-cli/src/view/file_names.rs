@@ -36,6 +36,7 @@ impl ViewedFolders {
             Error::InvalidRequest { key, text } => {
                 Error::InvalidRequest { key, text: self.removed_from(&text) }
             }
+            Error::Failed(text) => Error::Failed(self.removed_from(&text)),
             other => other,
         })
     }

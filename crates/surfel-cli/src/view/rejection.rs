@@ -14,6 +14,14 @@ pub fn rejection(error: impl Into<surfel::Error>) -> Error {
             let text = format!("no point meets {filter}{hint}");
             Error::InvalidRequest { key: key.map(str::to_owned), text }
         }
-        error => Error::invalid_request(error.to_string().replace('\n', " ")),
+        surfel::Error::MissingColumn { key, text, .. } => Error::invalid_value(key, text),
+        surfel::Error::Core(error @ surfel_core::Error::Renderer(_)) => error.into(),
+        error @ (surfel::Error::Threads(_)
+        | surfel::Error::File(surfel_formats::Error::Io { .. })) => Error::Failed(one_line(&error)),
+        error => Error::invalid_request(one_line(&error)),
     }
+}
+
+fn one_line(error: &surfel::Error) -> String {
+    error.to_string().replace('\n', " ")
 }

@@ -100,9 +100,9 @@ settings! {
         /// Moves noisy points onto their surface, and those of wires onto the axis of the wire: auto (surfaces whose noise is at
         /// least 0.15 of the spacing, and wires), on or off [default: auto, off for surfel prepare].
         denoise: Denoise, OneOf(DENOISE), "WHEN";
-        /// Points in the air where the range of a scan jumps, as the grids of E57, PTX and PCD files tell: drop or keep. surfel
-        /// prepare drops them only if this is given.
-        mixed_pixels: MixedPixels = MixedPixels::default(), OneOf(MIXED_PIXELS), "CHOICE";
+        /// Points in the air where the range of a scan jumps, as the grids of E57, PTX and PCD files tell: drop or keep
+        /// them [default: drop, keep for surfel prepare].
+        mixed_pixels: MixedPixels, OneOf(MIXED_PIXELS), "CHOICE";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
         /// Number of neighbours whose plane gives the normal. Where the surface bends, a cubic through 24 neighbours or
@@ -124,14 +124,14 @@ settings! {
         /// (leaves) apart; surface treats all points as surface, scatter all as scattered. Radii of the file, a length and
         /// the median leave all points surface.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
-        /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell unless points are left
-        /// out: by default also of filtered files.
-        free_space: bool = Preparation::default().free_space, Flag, "BOOL";
+        /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell [default: true, false
+        /// where a filter or crop leaves points out].
+        free_space: bool, Flag, "BOOL";
         /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
         salvage: bool = false, Flag, "BOOL";
         /// Moves clouds whose coordinates are degrees of longitude and latitude to metres: to the coordinate system of
-        /// the files before, or to their UTM zone. surfel prepare does so only if this is given.
-        reproject: bool = true, Flag, "BOOL";
+        /// the files before, or to their UTM zone [default: true, false for surfel prepare].
+        reproject: bool, Flag, "BOOL";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
@@ -204,7 +204,7 @@ impl ObjectSettings {
             duplicates: settings.duplicates.unwrap_or(default.duplicates),
             noise_points: settings.noise_points.unwrap_or(default.noise_points),
             kept_noise: settings.class.clone().unwrap_or_default(),
-            mixed_pixels: settings.mixed_pixels(),
+            mixed_pixels: settings.mixed_pixels.unwrap_or(default.mixed_pixels),
             subsample: settings.subsample,
             remove_outliers: settings.remove_outliers,
             denoise: settings.denoise.unwrap_or(default.denoise),
@@ -252,7 +252,8 @@ impl ObjectSettings {
     /// Returns the columns that only the preparation needs: what the scanner tells of each point.
     pub fn columns_of_preparation(&self) -> Vec<&'static str> {
         let mut columns = Vec::new();
-        if self.preparation.free_space() || self.preparation.mixed_pixels() == MixedPixels::Drop {
+        let settings = &self.preparation;
+        if settings.free_space != Some(false) || settings.mixed_pixels != Some(MixedPixels::Keep) {
             columns.extend([ROW_INDEX, COLUMN_INDEX]);
         }
         if matches!(self.orientation(), Orientation::Auto | Orientation::ScanAngle) {

@@ -238,11 +238,14 @@ pub fn from_core(error: surfel_core::Error) -> Invalid {
     }
 }
 
-/// Advises on a text by the nearest of the names in a list as `auto, none or viewpoint:x,y,z`; empty if none is near.
-fn nearest_word(found: &str, list: &str) -> String {
+/// Advises on a text by the nearest of the names in a list as `auto, none or viewpoint:x,y,z`; empty if none is near,
+/// and for one of the names whose values are wrong.
+fn nearest_word<'l>(found: &str, list: &'l str) -> String {
+    let name_of = |item: &'l str| item.split([':', '[']).next().unwrap_or_default();
     let items = list.split(", ").flat_map(|items| items.split(" or "));
-    let names = items.filter_map(|item| item.split(':').next());
-    nearest_if_any(found, names.filter(|name| !name.contains(' ')))
+    let names: Vec<&str> = items.map(name_of).filter(|name| !name.contains(' ')).collect();
+    let found_name = found.split(':').next().unwrap_or_default();
+    if names.contains(&found_name) { String::new() } else { nearest_if_any(found, names) }
 }
 
 /// One of a few names.

@@ -56,7 +56,9 @@ pub fn import(
         Some(MemoryContent::Points(cloud, system)) => {
             report_degrees(cloud, system.as_deref(), &[], progress);
         }
-        _ if settings.preparation.reproject() => return Ok(with_metres(loaded, options, progress)),
+        _ if settings.preparation.reproject != Some(false) => {
+            return Ok(with_metres(loaded, options, progress));
+        }
         _ => {}
     }
     Ok(loaded)
@@ -237,12 +239,7 @@ fn in_file<'c>(cloud: &'c PointCloud, file_from_cloud: &DAffine3) -> Cow<'c, Poi
         return Cow::Borrowed(cloud);
     }
     let mut moved = cloud.clone();
-    let matrix = file_from_cloud.matrix3;
-    moved.origin = file_from_cloud.transform_point3(cloud.origin);
-    moved.positions.iter_mut().for_each(|p| *p = (matrix * p.as_dvec3()).as_vec3());
-    let of_normals = matrix.inverse().transpose();
-    let turned = |normal: &Vec3| (of_normals * normal.as_dvec3()).normalize_or_zero().as_vec3();
-    moved.normals.iter_mut().flatten().for_each(|normal| *normal = turned(normal));
+    moved.transform(file_from_cloud);
     Cow::Owned(moved)
 }
 

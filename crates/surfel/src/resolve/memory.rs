@@ -194,11 +194,15 @@ impl MemoryEstimate {
         let things = [(self.n_points, "point"), (self.n_triangles, "triangle")];
         let there = things.iter().filter(|(count, _)| 0 < *count);
         let things: Vec<String> = there.map(|(count, name)| counted(*count, name)).collect();
+        let subject = match things.as_slice() {
+            [] => "the picture needs".to_owned(),
+            [thing] if self.n_points + self.n_triangles == 1 => format!("{thing} needs"),
+            things => format!("{} need", things.join(" and ")),
+        };
         let (advice, key) = self.advice(limit).unzip();
         let line = format!(
-            "{} need about {} of memory ({} as read, {} {}, {} picture), and the limit is {}; \
+            "{subject} about {} of memory ({} as read, {} {}, {} picture), and the limit is {}; \
              {}raise the limit",
-            things.join(" and "),
             readable(all),
             readable(read),
             readable(prepared),

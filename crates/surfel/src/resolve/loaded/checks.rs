@@ -6,7 +6,6 @@ use super::super::memory::MemoryEstimate;
 use super::LoadedScene;
 use crate::description::{SceneDescription, nearest_if_any};
 use crate::error::{Error, Result};
-use crate::names::list_files;
 use surfel_core::points::{STRUCTURE, SURFACE_VARIATION};
 use surfel_core::render::check_surfaces;
 use surfel_core::scene::Geometry;
@@ -54,20 +53,23 @@ impl LoadedScene {
             }
             let info = self.file_info();
             let columns = colorable_columns(&info.columns);
-            if color == ColorSource::Class && columns.contains(&"class") {
-                let files = list_files(self.files_of(i, description));
-                return Err(Error::Unfit(format!(
-                    "{files}: all classes are zero; choose other colours [color]"
-                )));
-            }
-            return Err(Error::Unfit(format!(
-                "{}: no column {color}{}; there are {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, CSS colour \
-                 names and what the file has: {} [color]",
-                list_files(self.files_of(i, description)),
-                nearest_if_any(&color.to_string(), columns.iter().copied()),
-                ColorSource::names_where(ColorSource::is_computed).join(", "),
-                if columns.is_empty() { "only positions".to_owned() } else { columns.join(", ") },
-            )));
+            let text = if color == ColorSource::Class && columns.contains(&"class") {
+                "all classes are zero; choose other colours".to_owned()
+            } else {
+                format!(
+                    "no column {color}{}; there are {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, CSS colour names and \
+                     what the file has: {}",
+                    nearest_if_any(&color.to_string(), columns.iter().copied()),
+                    ColorSource::names_where(ColorSource::is_computed).join(", "),
+                    if columns.is_empty() {
+                        "only positions".to_owned()
+                    } else {
+                        columns.join(", ")
+                    },
+                )
+            };
+            let files = self.files_of(i, description).to_vec();
+            return Err(Error::MissingColumn { files, key: "color", text });
         }
         Ok(())
     }
