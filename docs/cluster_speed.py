@@ -1,4 +1,4 @@
-"""Measures how much faster two workers of a local Dask cluster render a film than one, with a thread each.
+"""Measures how much faster two workers of a local Dask cluster render a movie than one, with a thread each.
 
     python docs/cluster_speed.py scan.ply [--frames 20] [--resolution 960x540] [--spp 4]
 
@@ -13,8 +13,8 @@ from distributed import Client, LocalCluster
 from surfel.dask import Recipe, _worker, render_frames
 
 
-def seconds_of_film(recipe, n_frames, n_workers):
-    """Seconds of preparation on the slowest worker, seconds of the film, and its frames."""
+def seconds_of_movie(recipe, n_frames, n_workers):
+    """Seconds of preparation on the slowest worker, seconds of the movie, and its frames."""
     cluster = LocalCluster(n_workers=n_workers, threads_per_worker=1, dashboard_address=None)
     with cluster, Client(cluster) as client:
         start = time.perf_counter()
@@ -25,8 +25,8 @@ def seconds_of_film(recipe, n_frames, n_workers):
 
 
 def _prepare(recipe):
-    """Makes the film of a recipe, which the worker keeps."""
-    _worker.film(recipe)
+    """Makes the movie of a recipe, which the worker keeps."""
+    _worker.movie(recipe)
 
 
 def main():
@@ -38,10 +38,10 @@ def main():
     args = parser.parse_args()
     keys = {"resolution": args.resolution, "spp": args.spp, "fps": args.frames, "threads": 1}
     recipe = Recipe(args.scan, turntable=1, **keys)
-    one, two = (seconds_of_film(recipe, args.frames, n_workers) for n_workers in (1, 2))
+    one, two = (seconds_of_movie(recipe, args.frames, n_workers) for n_workers in (1, 2))
     assert one[2] == two[2], "the frames depend on the number of workers"
-    for name, (preparation, film, _) in (("1 worker", one), ("2 workers", two)):
-        print(f"{name}: {preparation:.1f} s of preparation, {film:.1f} s of {args.frames} frames")
+    for name, (preparation, movie, _) in (("1 worker", one), ("2 workers", two)):
+        print(f"{name}: {preparation:.1f} s of preparation, {movie:.1f} s of {args.frames} frames")
     with_preparation = (one[0] + one[1]) / (two[0] + two[1])
     print(f"{one[1] / two[1]:.2f} times faster, {with_preparation:.2f} times with the preparation")
 

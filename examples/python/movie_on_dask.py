@@ -1,6 +1,6 @@
-"""Frames of a film on a cluster, or on two processes of this machine if no scheduler is named.
+"""Frames of a movie on a cluster, or on two processes of this machine if no scheduler is named.
 
-    python film_on_dask.py scan.laz frames/frame_####.png 640x360 200 tcp://scheduler:8786
+    python movie_on_dask.py scan.laz frames/frame_####.png 640x360 200 tcp://scheduler:8786
 """
 
 import pathlib

@@ -1,4 +1,4 @@
-"""A film that turns a scan once in eight seconds.
+"""A movie that turns a scan once in eight seconds.
 
     python turntable.py scan.laz turn.gif
 """

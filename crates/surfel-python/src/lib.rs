@@ -37,7 +37,7 @@ mod native {
     #[pymodule_export]
     use crate::image::PyImage;
     #[pymodule_export]
-    use crate::movie::{PyFilm, animate};
+    use crate::movie::{PyMovie, animate};
     #[pymodule_export]
     use crate::preparation::{prepare, read_cloud};
     #[pymodule_export]

@@ -57,12 +57,12 @@ pub fn animate(
 /// The frames of a movie of a scene as it is now, one by one and in any order: pictures of the colour alone. Keywords are
 /// keys of scene files, as `fps`, `frames` and `turntable` (seconds of a turn).
 ///
-/// `film[0]` is the first frame, `film[-1]` the last one; `for image in film` renders each. `progress` is called as
+/// `movie[0]` is the first frame, `movie[-1]` the last one; `for image in movie` renders each. `progress` is called as
 /// `progress(stage, done, total)` while the scene is read.
 ///
 /// Raises `InvalidSetting` if nothing moves and neither `frames` nor `turntable` is given.
-#[pyclass(frozen, module = "surfel", name = "Film")]
-pub struct PyFilm {
+#[pyclass(frozen, module = "surfel", name = "Movie")]
+pub struct PyMovie {
     movie: Mutex<BuiltMovie>,
     n_frames: u32,
     /// About how many bytes the scene takes.
@@ -72,7 +72,7 @@ pub struct PyFilm {
 }
 
 #[pymethods]
-impl PyFilm {
+impl PyMovie {
     #[new]
     #[pyo3(signature = (scene, *, progress = None, **keys))]
     fn new(
@@ -100,7 +100,7 @@ impl PyFilm {
         self.n_frames as usize
     }
 
-    /// Returns about how many bytes the film takes.
+    /// Returns about how many bytes the movie takes.
     fn _memory_estimate(&self) -> u64 {
         self.memory_estimate
     }
@@ -113,10 +113,10 @@ impl PyFilm {
     }
 
     /// Renders one frame after the other.
-    fn __iter__<'py>(film: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let builtins = film.py().import("builtins")?;
-        let indices = builtins.call_method1("range", (film.get().n_frames,))?;
-        builtins.call_method1("map", (film.getattr("render")?, indices))
+    fn __iter__<'py>(movie: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let builtins = movie.py().import("builtins")?;
+        let indices = builtins.call_method1("range", (movie.get().n_frames,))?;
+        builtins.call_method1("map", (movie.getattr("render")?, indices))
     }
 
     /// Renders a frame, counted from 0: the picture that `animate` would write, without layers but the colour.
@@ -143,7 +143,7 @@ impl PyFilm {
     }
 }
 
-impl PyFilm {
+impl PyMovie {
     fn rendered(
         &self,
         py: Python<'_>,

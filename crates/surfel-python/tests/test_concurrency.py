@@ -164,8 +164,8 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
-    film = surfel.Film(surfel.load(hill), frames=2, turntable=1, threads=1, resolution=(320, 240), spp=16, light_samples=16)
-    rendering = threading.Thread(target=lambda: film.render(0))
+    movie = surfel.Movie(surfel.load(hill), frames=2, turntable=1, threads=1, resolution=(320, 240), spp=16, light_samples=16)
+    rendering = threading.Thread(target=lambda: movie.render(0))
     rendering.start()
     time.sleep(0.2)
     # Programs that a shell has put in the background ignore the signal.
@@ -173,7 +173,7 @@ def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
     threading.Timer(0.2, _thread.interrupt_main).start()
     try:
         with pytest.raises(KeyboardInterrupt):
-            film.render(1)
+            movie.render(1)
         assert rendering.is_alive()
     finally:
         signal.signal(signal.SIGINT, previous)

@@ -136,16 +136,16 @@ def test_a_scheduler_that_vanishes_leaves_the_finished_frames(hill, tmp_path):
         processes.append(start("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard"))
         with distributed.Client(scheduler_file=str(found)) as client:
             client.wait_for_workers(1, timeout=300)
-            (tmp_path / "film").mkdir()
-            arguments = (processes[0], tmp_path / "film")
+            (tmp_path / "movie").mkdir()
+            arguments = (processes[0], tmp_path / "movie")
             end = threading.Thread(target=kill_after_a_file, args=arguments, daemon=True)
             end.start()
             with pytest.raises(ClusterLost, match="start it and do the same again"):
-                save_frames(Recipe(hill, turntable=40, **SMALL), range(1000), tmp_path / "film" / "frame_####.png")
+                save_frames(Recipe(hill, turntable=40, **SMALL), range(1000), tmp_path / "movie" / "frame_####.png")
             end.join()
     finally:
         [process.kill() for process in processes]
-    assert 0 < len(list((tmp_path / "film").glob("frame_*.png"))) < 1000
+    assert 0 < len(list((tmp_path / "movie").glob("frame_*.png"))) < 1000
 
 
 def kill_after_a_file(process, folder):
@@ -204,7 +204,7 @@ def test_wrong_recipes_are_named_where_they_are_rendered(hill):
         save_frames(Recipe(hill), range(2), "frame.png")
 
 
-def test_films_survive_a_worker(recipe, tmp_path):
+def test_movies_survive_a_worker(recipe, tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:

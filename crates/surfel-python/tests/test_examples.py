@@ -15,11 +15,11 @@ RUNS = {
     "color_by_column": ("column.png", ["64x48"]),
     "shadow_hours": ("hours.npy", ["20"]),
     "turntable": ("turn.gif", ["32x24", "4"]),
-    "film_on_dask": ("frame_####.png", ["32x24", "4"]),
+    "movie_on_dask": ("frame_####.png", ["32x24", "4"]),
     "mosaic_on_dask": ("plan.tif", ["0.1"]),
 }
 
-NEEDS = {"color_by_column": "pandas", "film_on_dask": "distributed", "mosaic_on_dask": "distributed"}
+NEEDS = {"color_by_column": "pandas", "movie_on_dask": "distributed", "mosaic_on_dask": "distributed"}
 
 
 def test_every_example_is_run():

@@ -28,7 +28,7 @@ def test_frames_are_those_of_the_program(hill, tmp_path):
 def test_settings_by_name_hold_for_movies(hill):
     by_name = surfel.load(hill, object_settings=["hill.xyz:color=#ff0000"], turntable=2, **SMALL)
     of_all = surfel.load(hill, color="#ff0000", turntable=2, **SMALL)
-    frames = [surfel.Film(scene, frames=2).render(1) for scene in (by_name, of_all)]
+    frames = [surfel.Movie(scene, frames=2).render(1) for scene in (by_name, of_all)]
     assert (frames[0].color == frames[1].color).all() and frames[0].coverage.any()
 
 
@@ -90,25 +90,25 @@ def test_videos_are_encoded(hill, tmp_path):
 
 def test_frames_are_rendered_one_by_one(hill, tmp_path):
     scene = surfel.load(hill, turntable=1, fps=5, **SMALL)
-    film = surfel.Film(scene)
-    assert len(film) == 5
+    movie = surfel.Movie(scene)
+    assert len(movie) == 5
     surfel.animate(scene, tmp_path / "f_#.png")
     for index in (3, 0, 4):
-        assert film.render(index)._repr_png_() == (tmp_path / f"f_{index + 1}.png").read_bytes()
+        assert movie.render(index)._repr_png_() == (tmp_path / f"f_{index + 1}.png").read_bytes()
     with pytest.raises(IndexError, match="frame 5: expected 0 to 4"):
-        film.render(5)
+        movie.render(5)
     with pytest.raises(ValueError, match="^index: found -1, expected 0 to 4"):
-        film.render(-1)
+        movie.render(-1)
     with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
-        surfel.Film(surfel.load(hill))
+        surfel.Movie(surfel.load(hill))
 
 
-def test_films_are_sequences_of_pictures(hill):
-    film = surfel.Film(surfel.load(hill, turntable=1, fps=3, **SMALL))
-    pictures = [film.render(i).color for i in range(3)]
-    assert [(image.color == picture).all() for image, picture in zip(film, pictures)] == [True] * 3
-    assert len(list(film)) == 3
-    assert (film[0].color == pictures[0]).all() and (film[-1].color == pictures[2]).all()
+def test_movies_are_sequences_of_pictures(hill):
+    movie = surfel.Movie(surfel.load(hill, turntable=1, fps=3, **SMALL))
+    pictures = [movie.render(i).color for i in range(3)]
+    assert [(image.color == picture).all() for image, picture in zip(movie, pictures)] == [True] * 3
+    assert len(list(movie)) == 3
+    assert (movie[0].color == pictures[0]).all() and (movie[-1].color == pictures[2]).all()
     for index in (3, -4):
         with pytest.raises(IndexError):
-            film[index]
+            movie[index]

@@ -13,7 +13,7 @@ PARAMETERS = {
     "color_by_column": {"resolution": "64x48"},
     "shadow_hours": {"n": 20},
     "turntable": {"resolution": "32x24", "frames": 4},
-    "film_on_dask": {"resolution": "32x24", "frames": 4},
+    "movie_on_dask": {"resolution": "32x24", "frames": 4},
     "mosaic_on_dask": {"gsd": 0.1},
     "viewer": {},
 }

@@ -154,8 +154,8 @@ def test_pictures_of_what_is_known_list_the_same_choices(hill):
     other = scene.render(**keys).choices
     scene.render(**SMALL)
     assert scene.render(**keys).choices == other and any("[columns]" in choice for choice in other)
-    films = surfel.Film(scene, frames=2, turntable=1, **SMALL)
-    assert any("[columns]" in choice for choice in films.render(0).choices)
+    movies = surfel.Movie(scene, frames=2, turntable=1, **SMALL)
+    assert any("[columns]" in choice for choice in movies.render(0).choices)
 
 
 def test_warnings_of_all_calls_reach_the_module_warnings(hill):

@@ -222,7 +222,7 @@ def test_names_are_given_once(points):
         lambda scene: scene.render(),
         lambda scene: scene.bounds,
         lambda scene: scene.cast_rays([down(0, 0)]),
-        lambda scene: surfel.Film(scene, turntable=1),
+        lambda scene: surfel.Movie(scene, turntable=1),
         lambda scene: surfel.animate(scene, "turn.gif", turntable=1),
         lambda scene: surfel.view(scene),
         lambda scene: surfel.load(),

@@ -82,7 +82,7 @@ def test_every_public_name_has_a_docstring():
         (surfel.Cloud, ["(N, 3)", "`crs`", "in the unit of the positions", "Raises `InvalidArray`"]),
         (surfel.Mesh, ["(M, 3)", "counter-clockwise", "Raises `InvalidArray`"]),
         (surfel.Scene, ["keys of scene files", "Raises `InvalidSetting`"]),
-        (surfel.Film, ["`turntable`", "Raises `InvalidSetting`"]),
+        (surfel.Movie, ["`turntable`", "Raises `InvalidSetting`"]),
     ],
 )
 def test_help_about_a_class_says_what_it_takes(value, words):

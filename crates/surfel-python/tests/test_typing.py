@@ -14,7 +14,7 @@ image = scene.render(resolution=(64, 48))
 depth: numpy.typing.NDArray[numpy.float32] = image.depth
 rays = surfel.create_rays_pinhole(60, (0, 0, 0), (0, -5, 2), (0, 0, 1), 640, 480)
 hits = scene.cast_rays(rays)["t_hit"]
-frames: list[surfel.Image] = [frame for frame in surfel.Film(scene, turntable=4)]
+frames: list[surfel.Image] = [frame for frame in surfel.Movie(scene, turntable=4)]
 height, width, channels = image.shape
 with surfel.view(scene) as viewer:
     viewer.wait()

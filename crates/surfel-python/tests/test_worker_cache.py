@@ -71,10 +71,10 @@ def test_limits_are_read_from_the_configuration():
     assert memory_limit() > 1 << 28
 
 
-def test_scenes_and_films_state_their_memory(hill):
+def test_scenes_and_movies_state_their_memory(hill):
     import surfel
 
     scene = Recipe(hill, turntable=1).scene()
     # 2500 points: columns as read and as prepared, block and tree.
     assert 2500 * 60 < scene._memory_estimate() < 2500 * 200
-    assert surfel.Film(scene, resolution=(8, 8))._memory_estimate() == scene._memory_estimate()
+    assert surfel.Movie(scene, resolution=(8, 8))._memory_estimate() == scene._memory_estimate()

@@ -1,4 +1,4 @@
-// The path of the camera: views at times, played, exported as a film that the command line makes alike.
+// The path of the camera: views at times, played, exported as a movie that the command line makes alike.
 
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -30,10 +30,10 @@ async function addViews(...sides) {
   }
 }
 
-/** Sets size and rate of the film. */
-async function setFilm(values) {
+/** Sets size and rate of the movie. */
+async function setMovie(values) {
   for (const [key, value] of Object.entries(values)) {
-    const field = page.locator(`[data-film="${key}"]`);
+    const field = page.locator(`[data-movie="${key}"]`);
     if (key === 'format') await field.selectOption(value);
     else await field.fill(String(value));
   }
@@ -107,19 +107,19 @@ test('the path is played, and stopped by hand', async () => {
   await settled(page);
 });
 
-test('the film is that of the command line, byte for byte', async () => {
+test('the movie is that of the command line, byte for byte', async () => {
   await addViews('front', 'right', 'top');
-  await setFilm({ format: 'png', width: 96, height: 64, fps: 2 });
-  await page.locator('[data-action="film"]').click();
-  const link = page.locator('[data-action="download-film"]');
+  await setMovie({ format: 'png', width: 96, height: 64, fps: 2 });
+  await page.locator('[data-action="movie"]').click();
+  const link = page.locator('[data-action="download-movie"]');
   await link.waitFor();
-  assert.match(await page.locator('.film .note[role]').textContent(), /^12 frames/);
-  const [film] = await Promise.all([page.waitForEvent('download'), link.click()]);
-  assert.equal(film.suggestedFilename(), 'town-film.png');
-  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[data-action="film-scene-file"]').click()]);
-  writeFileSync(join(data.folder, 'film.toml'), readFileSync(await file.path()));
-  shell('surfel animate film.toml -o film.png --fps 2 -q');
-  assert.deepEqual(readFileSync(await film.path()), readFileSync(join(data.folder, 'film.png')));
+  assert.match(await page.locator('.movie .note[role]').textContent(), /^12 frames/);
+  const [movie] = await Promise.all([page.waitForEvent('download'), link.click()]);
+  assert.equal(movie.suggestedFilename(), 'town-movie.png');
+  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[data-action="movie-scene-file"]').click()]);
+  writeFileSync(join(data.folder, 'movie.toml'), readFileSync(await file.path()));
+  shell('surfel animate movie.toml -o movie.png --fps 2 -q');
+  assert.deepEqual(readFileSync(await movie.path()), readFileSync(join(data.folder, 'movie.png')));
 });
 
 test('links and scene files carry the path, and pictures do not follow it', async () => {
@@ -145,18 +145,18 @@ test('links and scene files carry the path, and pictures do not follow it', asyn
   assert.deepEqual((await state(page, 'camera')).position.map(Math.fround), camera.position.map(Math.fround));
 });
 
-test('a film is cancelled, and wrong ones are refused', async () => {
-  assert.ok(await page.locator('[data-action="film"]').isDisabled());
+test('a movie is cancelled, and wrong ones are refused', async () => {
+  assert.ok(await page.locator('[data-action="movie"]').isDisabled());
   await addViews('front', 'right');
-  await setFilm({ format: 'gif', width: 800, height: 600, fps: 25 });
-  await page.locator('[data-action="film"]').click();
-  await page.locator('[data-action="cancel-film"]').click();
-  await page.locator('.film .note', { hasText: 'Cancelled.' }).waitFor();
-  await setFilm({ width: 800.5 });
-  await page.locator('[data-action="film"]').click();
-  await page.locator('[data-film="width"]:invalid:focus').waitFor();
-  assert.ok(await page.locator('[data-action="cancel-film"]').isHidden());
-  await setFilm({ width: 32000, height: 32000 });
-  await page.locator('[data-action="film"]').click();
-  await page.locator('.film .note', { hasText: 'expected' }).waitFor();
+  await setMovie({ format: 'gif', width: 800, height: 600, fps: 25 });
+  await page.locator('[data-action="movie"]').click();
+  await page.locator('[data-action="cancel-movie"]').click();
+  await page.locator('.movie .note', { hasText: 'Cancelled.' }).waitFor();
+  await setMovie({ width: 800.5 });
+  await page.locator('[data-action="movie"]').click();
+  await page.locator('[data-movie="width"]:invalid:focus').waitFor();
+  assert.ok(await page.locator('[data-action="cancel-movie"]').isHidden());
+  await setMovie({ width: 32000, height: 32000 });
+  await page.locator('[data-action="movie"]').click();
+  await page.locator('.movie .note', { hasText: 'expected' }).waitFor();
 });

@@ -1,18 +1,18 @@
-// The export of films: the link to a film goes with the connection, as the film does.
+// The export of movies: the link to a movie goes with the connection, as the movie does.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { setUpFilmExport } from '../page/film-export.js';
+import { setUpMovieExport } from '../page/movie-export.js';
 import { signal } from '../page/signal.js';
 import { fakeDocument, settled } from './fake-dom.mjs';
 
-test('a film is downloaded until the connection is lost', async () => {
+test('a movie is downloaded until the connection is lost', async () => {
   fakeDocument();
   const viewer = {
     info: { name: 'town.laz' }, connectionChanged: signal(),
-    request: async () => ({ address: 'points/1', n_frames: 12, n_bytes: 640 }),
+    request: async () => ({ address: 'downloads/1', n_frames: 12, n_bytes: 640 }),
   };
-  const { part, update } = setUpFilmExport(viewer, null);
+  const { part, update } = setUpMovieExport(viewer, null);
   const [link] = part.all('a');
   const [start] = part.all('button');
   part.all('select')[0].value = 'mp4';
@@ -20,7 +20,7 @@ test('a film is downloaded until the connection is lost', async () => {
   update(false);
   start.emit('click');
   await settled();
-  assert.deepEqual([link.hidden, link.href, link.download], [false, 'points/1', 'town-film.mp4']);
+  assert.deepEqual([link.hidden, link.href, link.download], [false, 'downloads/1', 'town-movie.mp4']);
   assert.equal(note.textContent, '12 frames, 640\u00a0B');
   viewer.connectionChanged({ isConnected: false });
   assert.deepEqual([link.hidden, note.textContent, start.disabled], [true, '', false]);

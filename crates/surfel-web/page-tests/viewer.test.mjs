@@ -56,7 +56,7 @@ test('what is exported has all changes made before', async () => {
   await assert.rejects(cancelled, /cancelled/);
   server.send({ type: 'scene', number: 2, seq: 1, scene: { ...SCENE, color: 'class' }, camera: CAMERA, legend: null });
   const [{ id }] = server.sent('export');
-  server.send({ type: 'exported', id, command: 'surfel' });
+  server.send({ type: 'export', id, command: 'surfel' });
   assert.equal((await answer).command, 'surfel');
   assert.equal(server.sent('save').length, 0);
 });
@@ -80,7 +80,7 @@ test('a pick tells no surface from no answer', async () => {
   const [sky, refused] = [viewer.pick({ x: 1, y: 1 }), viewer.pick({ x: 2, y: 2 })];
   const [first, second] = server.sent('pick');
   server.send({ type: 'error', id: second.id, text: 'too many questions' });
-  server.send({ type: 'picked', id: first.id, point: null });
+  server.send({ type: 'pick', id: first.id, point: null });
   assert.equal(await sky, null);
   await assert.rejects(refused, /too many questions/);
 });

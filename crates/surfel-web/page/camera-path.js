@@ -43,7 +43,7 @@ export function fitsPath(keys, camera) {
   return Boolean(projection(camera)) && keys.every((key) => projection(key.camera) === projection(camera));
 }
 
-/** The camera at a time, as the film has it: between keys as `interpolation` says, before and behind them as the next. */
+/** The camera at a time, as the movie has it: between keys as `interpolation` says, before and behind them as the next. */
 export function cameraAt(keys, interpolation, time) {
   const next = keys.findIndex((key) => time < key.time);
   if (next <= 0) return (next === 0 ? keys[0] : keys.at(-1)).camera;

@@ -1,23 +1,23 @@
-// The part of the camera path's card that exports the path as a film: format, size, rate, progress and file.
+// The part of the camera path's card that exports the path as a movie: format, size, rate, progress and file.
 
 import { element } from './dom.js';
 import { counted, duration, fileSize, stemOf } from './format.js';
 
 const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'animated PNG' };
 
-/** `sceneFile` is the button beside those of the film. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
-export function setUpFilmExport(viewer, sceneFile) {
-  const number = (label, key, value, max, step = 1) => element('input', { type: 'number', min: 1, max, step, value, 'aria-label': label, 'data-film': key });
+/** `sceneFile` is the button beside those of the movie. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
+export function setUpMovieExport(viewer, sceneFile) {
+  const number = (label, key, value, max, step = 1) => element('input', { type: 'number', min: 1, max, step, value, 'aria-label': label, 'data-movie': key });
   const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120, 'any')];
-  const format = element('select', { 'aria-label': 'Format of the film', 'data-film': 'format' },
+  const format = element('select', { 'aria-label': 'Format of the movie', 'data-movie': 'format' },
     ...Object.entries(FORMATS).map(([value, label]) => element('option', { value }, label)));
-  const bar = element('progress', { max: 1, 'aria-label': 'Progress of the film', hidden: true });
+  const bar = element('progress', { max: 1, 'aria-label': 'Progress of the movie', hidden: true });
   const note = element('p', { class: 'note', role: 'status' });
-  const link = element('a', { class: 'button is-main', 'data-action': 'download-film', hidden: true }, 'Download');
-  const start = element('button', { type: 'button', class: 'button', 'data-action': 'film', onclick: () => write() }, 'Export film');
-  const cancel = element('button', { type: 'button', class: 'button', 'data-action': 'cancel-film', hidden: true, onclick: () => abort?.abort() }, 'Cancel');
-  const part = element('div', { class: 'film' },
-    element('h3', {}, 'Film'),
+  const link = element('a', { class: 'button is-main', 'data-action': 'download-movie', hidden: true }, 'Download');
+  const start = element('button', { type: 'button', class: 'button', 'data-action': 'movie', onclick: () => write() }, 'Export movie');
+  const cancel = element('button', { type: 'button', class: 'button', 'data-action': 'cancel-movie', hidden: true, onclick: () => abort?.abort() }, 'Cancel');
+  const part = element('div', { class: 'movie' },
+    element('h3', {}, 'Movie'),
     element('div', { class: 'chips' }, format, width, element('span', { 'aria-hidden': 'true' }, '×'), height, fps, element('span', { class: 'note' }, 'fps')),
     element('div', { class: 'chips' }, start, cancel, link, sceneFile), bar, note);
   let abort = null;
@@ -42,10 +42,10 @@ export function setUpFilmExport(viewer, sceneFile) {
       note.textContent = typeof left_secs === 'number' ? `Rendering, ${duration(left_secs)} left` : 'Rendering';
     };
     try {
-      const message = { type: 'film', format: format.value, ...size(), fps: fps.valueAsNumber || 25 };
+      const message = { type: 'movie', format: format.value, ...size(), fps: fps.valueAsNumber || 25 };
       const { address, n_frames, n_bytes } = await viewer.request(message, { progress, abort: abort.signal });
       link.href = address;
-      link.download = `${stemOf(viewer.info.name)}-film.${format.value}`;
+      link.download = `${stemOf(viewer.info.name)}-movie.${format.value}`;
       link.hidden = false;
       show(false, `${counted(n_frames, 'frame')}, ${fileSize(n_bytes)}`);
     } catch (error) {
@@ -54,7 +54,7 @@ export function setUpFilmExport(viewer, sceneFile) {
     abort = null;
   };
 
-  // The server keeps the film as long as the page is connected.
+  // The server keeps the movie as long as the page is connected.
   viewer.connectionChanged.listen(() => {
     if (!link.hidden) show(false, '');
     link.hidden = true;

@@ -49,7 +49,7 @@ export function namedViewRows(viewer, navigation, openPathCard) {
     list.replaceChildren(...shown.map(item));
   });
   const path = element('button', {
-    type: 'button', class: 'button', 'data-action': 'camera-path', title: 'Views at times, as a film\ncamera_path', onclick: openPathCard,
+    type: 'button', class: 'button', 'data-action': 'camera-path', title: 'Views at times, as a movie\ncamera_path', onclick: openPathCard,
   }, 'Camera path');
   return [list, element('div', { class: 'row' }, save, path)];
 }

@@ -1,8 +1,8 @@
-// The card that edits the path of the camera: views at times, played here and exported as a film.
+// The card that edits the path of the camera: views at times, played here and exported as a movie.
 
 import { cameraAt, fitsPath, keysOf, pathPatch, withNewKey, withTime } from './camera-path.js';
 import { download, element, icon, iconButton } from './dom.js';
-import { setUpFilmExport } from './film-export.js';
+import { setUpMovieExport } from './movie-export.js';
 import { stemOf } from './format.js';
 import { areEqual } from './merge-patch.js';
 import { showToast } from './toast.js';
@@ -22,13 +22,13 @@ export function setUpPathCard(viewer, navigation) {
   }, 'Add view');
   const note = element('p', { class: 'note' });
   const sceneFile = element('button', {
-    type: 'button', class: 'button', 'data-action': 'film-scene-file', title: 'surfel animate film.toml -o film.mp4', onclick: () => saveSceneFile(),
+    type: 'button', class: 'button', 'data-action': 'movie-scene-file', title: 'surfel animate movie.toml -o movie.mp4', onclick: () => saveSceneFile(),
   }, 'Scene file');
-  const film = setUpFilmExport(viewer, sceneFile);
+  const movie = setUpMovieExport(viewer, sceneFile);
   const card = element('section', { id: 'path-card', class: 'card', 'aria-label': 'Camera path', hidden: true },
     element('header', {}, element('h2', {}, 'Camera path'), iconButton('close', 'Close the camera path', () => show(false))),
     list, note,
-    element('div', { class: 'chips' }, addKey, play, clock), element('div', { class: 'chips' }, interpolation), film.part);
+    element('div', { class: 'chips' }, addKey, play, clock), element('div', { class: 'chips' }, interpolation), movie.part);
   document.getElementById('cards').append(card);
   let shown = null;
 
@@ -94,14 +94,14 @@ export function setUpPathCard(viewer, navigation) {
     const n = keys().length;
     note.textContent = n ? '' : 'Move to a view and add it; then move to the next one.';
     for (const button of [play, sceneFile]) button.disabled = n < 2;
-    film.update(n < 2);
+    movie.update(n < 2);
     showTime(0);
   };
 
   const saveSceneFile = async () => {
     try {
-      const { film: text } = await viewer.request({ type: 'export', ...film.size() });
-      download(new Blob([text]), `${stemOf(viewer.info.name)}-film.toml`);
+      const { movie: text } = await viewer.request({ type: 'export', ...movie.size() });
+      download(new Blob([text]), `${stemOf(viewer.info.name)}-movie.toml`);
     } catch (error) {
       showToast(error.message);
     }

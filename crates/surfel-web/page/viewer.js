@@ -11,7 +11,7 @@ const MAX_LATENCIES = 600;
 /** Minimum duration between two messages about the view: some screens show more pictures a second than the server takes. */
 const MIN_FLUSH_INTERVAL_MS = 8;
 /** Requests for what the view shows: they are sent once all changes before them have taken effect. */
-const VIEW_REQUESTS = ['export', 'save', 'film', 'points'];
+const VIEW_REQUESTS = ['export', 'save', 'movie', 'points'];
 
 export class Viewer {
   info = null;
@@ -283,22 +283,24 @@ export class Viewer {
   }
 
   #receive(message) {
+    const answer = () => this.#resolveRequest(message);
     const handlers = {
       welcome: () => this.#receiveWelcome(message),
       scene: () => this.#receiveScene(message),
       stats: () => this.statsReceived(message),
       state: () => this.progressChanged(message),
-      picked: () => this.#resolveRequest(message),
-      seen: () => this.#resolveRequest(message),
-      profiled: () => this.#resolveRequest(message),
-      measured: () => this.#resolveRequest(message),
-      counted: () => this.#resolveRequest(message),
       upload: () => this.#requests.get(message.id)?.progress?.(message),
-      added: () => this.#resolveRequest(message),
-      written: () => this.#resolveRequest(message),
-      exported: () => this.#resolveRequest(message),
       progress: () => this.#requests.get(message.id)?.progress?.(message),
       error: () => this.#receiveError(message),
+      pick: answer,
+      visible: answer,
+      profile: answer,
+      volume: answer,
+      histogram: answer,
+      added: answer,
+      points: answer,
+      movie: answer,
+      export: answer,
     };
     handlers[message.type]?.();
     this.#sendRequests();

@@ -1,4 +1,4 @@
-//! Files of points and films that pages have requested, until they are fetched or replaced.
+//! Files of points and movies that pages have requested, until they are fetched or replaced.
 
 use crate::scene_provider::WrittenFile;
 use axum::body::{Body, Bytes};

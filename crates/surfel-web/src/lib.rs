@@ -48,7 +48,7 @@ mod server;
 pub use frame_ancestors::FrameAncestors;
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
-    AddedFile, Error, Export, FilmOptions, PickedPoint, PictureOverlay, PicturePart,
+    AddedFile, Error, Export, MovieRequest, PickedPoint, PictureOverlay, PicturePart,
     PointDescriber, PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 pub use server::Server;

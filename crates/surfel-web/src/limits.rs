@@ -20,21 +20,21 @@ pub struct Limits {
     pub max_save_pixels: u64,
     /// Maximum number of camera rays and light samples of a saved picture together.
     pub max_rays: u64,
-    /// Maximum number of pixels of all frames of a film.
-    pub max_film_pixels: u64,
-    /// Maximum number of camera rays and light samples of a film together.
-    pub max_film_rays: u64,
+    /// Maximum number of pixels of all frames of a movie.
+    pub max_movie_pixels: u64,
+    /// Maximum number of camera rays and light samples of a movie together.
+    pub max_movie_rays: u64,
     /// Maximum number of camera rays a pixel, and of light samples.
     pub max_samples: u32,
     /// Maximum width and height of any picture, in pixels.
     pub max_side_length: u32,
     /// Maximum size of a page's message or a request's body, in bytes.
     pub max_message_bytes: usize,
-    /// Maximum number of saved pictures, films and files of points that are made at once, for all clients.
+    /// Maximum number of saved pictures, movies and files of points that are made at once, for all clients.
     pub max_renders: usize,
     /// Maximum number of blocking tasks at once, for all clients; further tasks wait.
     pub max_tasks: usize,
-    /// Maximum number of one page's saved pictures, films, files of points and added files that are made or on their way.
+    /// Maximum number of one page's saved pictures, movies, files of points and added files that are made or on their way.
     pub max_page_saves: usize,
     /// Maximum number of one page's questions about points at once: picks, profiles, volumes and histograms.
     pub max_page_queries: usize,
@@ -82,8 +82,8 @@ impl Default for Limits {
             max_view_pixels: 1 << 21,
             max_save_pixels: 1 << 26,
             max_rays: 1 << 34,
-            max_film_pixels: 1 << 32,
-            max_film_rays: 1 << 38,
+            max_movie_pixels: 1 << 32,
+            max_movie_rays: 1 << 38,
             max_samples: 1024,
             max_side_length: 1 << 15,
             max_message_bytes: 1 << 18,
@@ -166,12 +166,12 @@ impl Limits {
         Ok(())
     }
 
-    /// Checks the size of a film, and the work that it takes with a number of rays a pixel.
+    /// Checks the size of a movie, and the work that it takes with a number of rays a pixel.
     ///
     /// # Errors
     ///
-    /// Fails for films that would fill the disk or take days.
-    pub fn check_film(
+    /// Fails for movies that would fill the disk or take days.
+    pub fn check_movie(
         &self,
         (width, height): (u32, u32),
         rays_per_pixel: u64,
@@ -180,13 +180,13 @@ impl Limits {
         self.check_save_size(width, height)?;
         let n_pixels = u64::from(width) * u64::from(height) * u64::from(n_frames);
         let counts = [
-            (n_pixels, self.max_film_pixels, "pixels", "a smaller or shorter film"),
-            (n_pixels.saturating_mul(rays_per_pixel), self.max_film_rays, "rays", "fewer samples"),
+            (n_pixels, self.max_movie_pixels, "pixels", "a smaller or shorter movie"),
+            (n_pixels.saturating_mul(rays_per_pixel), self.max_movie_rays, "rays", "fewer samples"),
         ];
         for (found, limit, what, advice) in counts {
             if limit < found {
                 let text =
-                    format!("a film of {found} {what}, expected at most {limit}; choose {advice}");
+                    format!("a movie of {found} {what}, expected at most {limit}; choose {advice}");
                 return Err(Error::invalid_request(text));
             }
         }
@@ -261,10 +261,10 @@ mod tests {
         assert!(limits.check_save_size(9000, 9000).is_err());
         assert!(limits.check_save((4096, 4096), 1024).is_ok());
         assert!(limits.check_save((4096, 4096), 1025).is_err());
-        assert!(limits.check_film((1920, 1080), 20, 1800).is_ok());
-        assert!(limits.check_film((1920, 1080), 20, 3600).is_err());
-        assert!(limits.check_film((1920, 1080), 200, 1800).is_err());
-        assert!(limits.check_film((1, 0), 1, 1).is_err());
+        assert!(limits.check_movie((1920, 1080), 20, 1800).is_ok());
+        assert!(limits.check_movie((1920, 1080), 20, 3600).is_err());
+        assert!(limits.check_movie((1920, 1080), 200, 1800).is_err());
+        assert!(limits.check_movie((1, 0), 1, 1).is_err());
     }
 
     #[test]

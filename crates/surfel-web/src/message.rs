@@ -51,11 +51,11 @@ pub enum Incoming {
     Save { id: u32, width: u32, height: u32 },
     /// A request for the points that are shown as a file of a format, `laz` or `ply`.
     Points { id: u32, format: String },
-    /// A request for the film of the camera's path, of this format, size and rate.
-    Film { id: u32, format: String, width: u32, height: u32, fps: f64 },
+    /// A request for the movie of the camera's path, of this format, size and rate.
+    Movie { id: u32, format: String, width: u32, height: u32, fps: f64 },
     /// Announces a file that is to be added to the page's view, by its name and size.
     AddFile { id: u32, name: String, n_bytes: u64 },
-    /// Cancels a `Save`, `Points`, `Film` or `AddFile`.
+    /// Cancels a `Save`, `Points`, `Movie` or `AddFile`.
     Cancel { id: u32 },
     /// A request for the settings as command line and scene files.
     Export { id: u32, width: u32, height: u32 },

@@ -30,7 +30,7 @@ pub fn router(state: Arc<ServerState>) -> Router {
         .route("/ws", any(socket))
         .route("/scene", get(scene))
         .route("/stats", get(stats))
-        .route("/points/{name}", get(points))
+        .route("/downloads/{name}", get(download))
         .route("/files/{name}", post(added_file))
         .route("/render", get(render_query).post(render_body))
         .route_layer(from_fn_with_state(state.clone(), check_token));
@@ -65,7 +65,14 @@ impl From<AccessDenied> for Failure {
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        Self(StatusCode::BAD_REQUEST, error.to_string())
+        let status = match &error {
+            Error::InvalidRequest { .. } => StatusCode::BAD_REQUEST,
+            Error::Cancelled => StatusCode::SERVICE_UNAVAILABLE,
+            Error::Failed(_) | Error::Panicked | Error::Io { .. } => {
+                StatusCode::INTERNAL_SERVER_ERROR
+            }
+        };
+        Self(status, error.to_string())
     }
 }
 
@@ -175,8 +182,8 @@ async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {
     .into_response())
 }
 
-/// A file of points or a film that a page has requested.
-async fn points(State(state): State<Arc<ServerState>>, Path(name): Path<String>) -> RouteResult {
+/// A file of points or a movie that a page has requested.
+async fn download(State(state): State<Arc<ServerState>>, Path(name): Path<String>) -> RouteResult {
     let missing = || Failure(StatusCode::NOT_FOUND, "there is no such file any more".into());
     let file = state.downloads.get(&name).ok_or_else(missing)?;
     let body = downloads::body(&file).map_err(|_| missing())?;

@@ -76,15 +76,15 @@ pub trait SceneProvider: Send + Sync + 'static {
         progress: &dyn Progress,
     ) -> Result<Arc<dyn WrittenFile>>;
 
-    /// Writes the film of the camera's path in these settings, whose `resolution` is that of the frames.
+    /// Writes the movie of the camera's path in these settings, whose `resolution` is that of the frames.
     ///
     /// # Errors
     ///
-    /// Fails if a setting is invalid, without a path, if the film exceeds the limits, and if `progress` cancels.
-    fn write_film(
+    /// Fails if a setting is invalid, without a path, if the movie exceeds the limits, and if `progress` cancels.
+    fn write_movie(
         &self,
         settings: &SettingsMap,
-        options: &FilmOptions,
+        options: &MovieRequest,
         progress: &dyn Progress,
     ) -> Result<Arc<dyn WrittenFile>>;
 
@@ -144,16 +144,16 @@ pub trait AddedFile: Send + Sync {
     fn n_bytes(&self) -> u64;
 }
 
-/// The form of a film.
+/// The form of a movie.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FilmOptions {
+pub struct MovieRequest {
     /// Extension of the file, as in `mp4`.
     pub format: String,
     /// Frames a second.
     pub fps: f64,
 }
 
-/// A file of points or a film, which is removed when this is dropped.
+/// A file of points or a movie, which is removed when this is dropped.
 pub trait WrittenFile: Send + Sync {
     /// Number of points, or of frames.
     fn n_items(&self) -> u64;
@@ -242,8 +242,8 @@ pub struct Export {
     pub toml: String,
     /// A scene file in JSON.
     pub json: String,
-    /// A scene file in TOML of which the command line makes the film of the camera's path; none without a path.
-    pub film: Option<String>,
+    /// A scene file in TOML of which the command line makes the movie of the camera's path; none without a path.
+    pub movie: Option<String>,
 }
 
 /// A result with the viewer's error.
@@ -263,6 +263,9 @@ pub enum Error {
         /// The reason, without the key.
         text: String,
     },
+    /// The server failed, whatever was asked for.
+    #[error("{0}")]
+    Failed(String),
     /// The work panicked.
     #[error("internal error; please report it")]
     Panicked,
@@ -304,6 +307,7 @@ impl From<surfel_core::Error> for Error {
     fn from(error: surfel_core::Error) -> Self {
         match error {
             surfel_core::Error::Cancelled => Self::Cancelled,
+            surfel_core::Error::Renderer(text) => Self::Failed(text),
             other => Self::invalid_request(other.to_string()),
         }
     }

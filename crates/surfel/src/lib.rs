@@ -85,7 +85,7 @@ pub mod live_view;
 mod live_trees;
 mod height_map;
 pub mod live_scene;
-pub mod live_film;
+pub mod live_movie;
 
 pub use built_scene::BuiltScene;
 pub use description::SceneDescription;

@@ -22,7 +22,7 @@ use surfel_formats::MovieOptions;
 /// # Errors
 ///
 /// Fails if nothing moves, and for movements that are not valid.
-pub fn film_length(scene: &LiveScene, description: &SceneDescription) -> Result<u32> {
+pub fn movie_length(scene: &LiveScene, description: &SceneDescription) -> Result<u32> {
     let path_secs = camera_motion(description)?.map_or(0.0, |motion| motion.duration_secs());
     Ok(frame_count(description, scene.loaded().duration_secs().max(path_secs))?)
 }
@@ -34,14 +34,14 @@ pub fn film_length(scene: &LiveScene, description: &SceneDescription) -> Result<
 ///
 /// Fails for settings that do not fit the data, if nothing moves, if a frame cannot be rendered or written, and if
 /// cancelled; then no file is left.
-pub fn film(
+pub fn movie(
     scene: &LiveScene,
     description: &SceneDescription,
     output: &Path,
     progress: &dyn Progress,
 ) -> Result<u32> {
     let quiet = CancelOnly(progress);
-    let n_frames = film_length(scene, description)?;
+    let n_frames = movie_length(scene, description)?;
     let mut view = view_at(scene, description, 0.0, &quiet)?;
     let image = image_options(description, view.flat.origin);
     let options = MovieOptions { n_frames, image, ..movie_options(description) };
@@ -63,7 +63,7 @@ pub fn film(
         Ok(view.finished_frame(scene.render(&view, &quiet)?))
     });
     match written {
-        // The page cannot continue a film.
+        // The page cannot continue a movie.
         Err(Error::Unfinished { cause, .. }) => Err(*cause),
         written => written.map(|()| n_frames),
     }
@@ -98,7 +98,7 @@ fn up_of(view: &LiveView) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    //! The frames of films.
+    //! The frames of movies.
 
     use super::*;
     use crate::animate::PlannedMovie;
@@ -109,7 +109,7 @@ mod tests {
     use surfel_core::progress::NoProgress;
 
     #[test]
-    fn a_film_of_a_turntable_has_the_frames_of_its_animation() {
+    fn a_movie_of_a_turntable_has_the_frames_of_its_animation() {
         let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, (i % 3) as f32);
         let cloud = PointCloud::from_positions((0..400).map(corner).collect());
         let mut description = SceneDescription::of_files(["memory:corner"]);
@@ -117,15 +117,16 @@ mod tests {
         (description.output.turntable, description.output.fps) = (Some(4.0), Some(1.0));
         description.picture.resolution = Some((64, 36));
         (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
-        let name = |part: &str| format!("surfel-film-{part}-{}.gif", std::process::id());
-        let [filmed, animated] =
-            ["filmed", "animated"].map(|part| std::env::temp_dir().join(name(part)));
+        let name = |part: &str| format!("surfel-movie-{part}-{}.gif", std::process::id());
+        let [exported, animated] =
+            ["exported", "animated"].map(|part| std::env::temp_dir().join(name(part)));
         let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
-        assert_eq!(film(&scene, &description, &filmed, &NoProgress).unwrap(), 4);
+        assert_eq!(movie(&scene, &description, &exported, &NoProgress).unwrap(), 4);
         let movie = PlannedMovie::new(&description, &NoProgress).unwrap();
         movie.render(&animated, false, &NoProgress).unwrap();
-        let [of_film, of_animation] = [&filmed, &animated].map(|path| std::fs::read(path).unwrap());
-        [filmed, animated].iter().for_each(|path| std::fs::remove_file(path).unwrap());
-        assert!(of_film == of_animation);
+        let [of_movie, of_animation] =
+            [&exported, &animated].map(|path| std::fs::read(path).unwrap());
+        [exported, animated].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+        assert!(of_movie == of_animation);
     }
 }

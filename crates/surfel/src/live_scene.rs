@@ -196,6 +196,7 @@ impl LiveScene {
                 loaded.filtered(description, progress)
             })?,
         };
+        kept.check_colors(description)?;
         let auto = AutoSettings::choose(&kept, description, progress)?;
         Ok((kept, auto))
     }

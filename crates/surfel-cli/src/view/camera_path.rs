@@ -1,4 +1,4 @@
-//! The path of the camera that a page has edited: keys of the scene file, which its film follows and its view does not.
+//! The path of the camera that a page has edited: keys of the scene file, which its movie follows and its view does not.
 
 use super::rejection::rejection;
 use super::temp_download::TempDownload;
@@ -6,16 +6,16 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::{AnimationDescription, AnimationKind, write_table};
-use surfel::live_film::{film, film_length};
+use surfel::live_movie::{movie, movie_length};
 use surfel::live_scene::LiveScene;
 use surfel_core::progress::Progress;
 use surfel_formats::TempFile;
-use surfel_web::{Error, FilmOptions, Limits, Result, SettingsMap, WrittenFile};
+use surfel_web::{Error, Limits, MovieRequest, Result, SettingsMap, WrittenFile};
 
 /// The key of a page's settings: the table of an animation of the camera, without object and kind.
 pub const KEY: &str = "camera_path";
 
-/// Formats of films.
+/// Formats of movies.
 const FORMATS: [&str; 4] = ["mp4", "webm", "gif", "png"];
 
 /// Maximum number of keys of a path.
@@ -66,33 +66,33 @@ pub fn with_path(
     description
 }
 
-/// Renders the film of a description.
+/// Renders the movie of a description.
 ///
 /// # Errors
 ///
-/// Fails for other formats, for films beyond the limits, as rendering does, and if cancelled.
-pub fn write_film(
+/// Fails for other formats, for movies beyond the limits, as rendering does, and if cancelled.
+pub fn write_movie(
     scene: &LiveScene,
     mut description: SceneDescription,
-    options: &FilmOptions,
+    options: &MovieRequest,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<Arc<dyn WrittenFile>> {
-    let FilmOptions { format, fps } = options;
+    let MovieRequest { format, fps } = options;
     if !FORMATS.contains(&&format[..]) {
         let text = format!("found the format {format}, expected {}", FORMATS.join(", "));
         return Err(Error::invalid_request(text));
     }
     description.set("fps", &json!(fps), "".as_ref()).map_err(rejection)?;
-    let n_frames = film_length(scene, &description).map_err(rejection)?;
+    let n_frames = movie_length(scene, &description).map_err(rejection)?;
     let picture = &description.picture;
     let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
-    limits.check_film(picture.resolution(), rays_per_pixel, n_frames)?;
-    let name = format!("film.{format}");
+    limits.check_movie(picture.resolution(), rays_per_pixel, n_frames)?;
+    let name = format!("movie.{format}");
     let mut written_to = String::new();
     let file = TempFile::write(&name, |path| {
         written_to = path.display().to_string();
-        film(scene, &description, path, progress).map(drop)
+        movie(scene, &description, path, progress).map(drop)
     });
     let file = file.map_err(|error| match error {
         surfel::Error::File(error) if !matches!(error, surfel_formats::Error::Core(_)) => {

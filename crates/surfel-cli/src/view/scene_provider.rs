@@ -1,7 +1,7 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
 use super::added_files::{self, AddedFiles, PageFile};
-use super::camera_path::{camera_path, with_path, write_film};
+use super::camera_path::{camera_path, with_path, write_movie};
 use super::facts::{
     classes, columns, filter_columns, has_returns, stations, surfaces, unit_symbol,
 };
@@ -36,7 +36,7 @@ use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::Material;
 use surfel_core::scene::color::ColorSource;
 use surfel_web::{
-    AddedFile, Error, Export, FilmOptions, Limits, PickedPoint, PointDescriber, PreparedScene,
+    AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PreparedScene,
     Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
@@ -375,16 +375,16 @@ impl SceneProvider for FileSceneProvider {
         self.folders.removed(write_shown_points(&view, time_secs, format, progress))
     }
 
-    fn write_film(
+    fn write_movie(
         &self,
         settings: &SettingsMap,
-        options: &FilmOptions,
+        options: &MovieRequest,
         progress: &dyn Progress,
     ) -> Result<Arc<dyn WrittenFile>> {
         let text = "there is no path of the camera; add views to it";
         let path = camera_path(settings)?.ok_or_else(|| Error::invalid_request(text))?;
         let description = with_path(self.read(settings)?, path);
-        self.folders.removed(write_film(&self.scene, description, options, &self.limits, progress))
+        self.folders.removed(write_movie(&self.scene, description, options, &self.limits, progress))
     }
 
     fn read_added_file(
@@ -407,7 +407,7 @@ impl SceneProvider for FileSceneProvider {
         let (kept, auto) = self.folders.removed(chosen)?;
         let mut complete = auto.complete_description(&kept);
         let path = camera_path(settings)?;
-        let film = path.clone().map(|path| toml_of(&with_path(complete.clone(), path)));
+        let movie = path.clone().map(|path| toml_of(&with_path(complete.clone(), path)));
         if let Some(path) = path {
             complete = with_path(complete, path);
             // The picture shows this view.
@@ -421,7 +421,7 @@ impl SceneProvider for FileSceneProvider {
         Ok(Export {
             command: command_line(&words),
             toml: toml_of(&complete)?,
-            film: film.transpose()?,
+            movie: movie.transpose()?,
             json: added_files::with_relative_paths(&format!("{:#}", with_info(&complete, &kept))),
         })
     }

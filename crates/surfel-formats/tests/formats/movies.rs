@@ -80,7 +80,7 @@ fn animated_png_is_lossless() {
         (BitDepth::Eight, Alpha::Drop, 23.976, (125, 2997)),
         (BitDepth::Sixteen, Alpha::Keep, 0.5, (2, 1)),
     ] {
-        let path = folder.path("film.png");
+        let path = folder.path("movie.png");
         let image = ImageOptions { depth, alpha, ..Default::default() };
         let options = MovieOptions { image, fps, ..options() };
         write_movie(&path, &options);
@@ -113,7 +113,7 @@ fn still_samples(path: &Path, options: &MovieOptions, frame: u32) -> Vec<u8> {
 #[test]
 fn gif_frames_have_accurate_times_and_colours() {
     let folder = Folder::new("gif");
-    let path = folder.path("film.GIF");
+    let path = folder.path("movie.GIF");
     let options = MovieOptions { width: 128, height: 96, n_frames: 6, ..options() };
     write_movie(&path, &options);
 
@@ -140,7 +140,7 @@ fn gif_frames_have_accurate_times_and_colours() {
     // The delays sum to exactly 0.2 s, although 1/30 s is not a multiple of 0.01 s.
     assert_eq!(delays, [3, 4, 3, 3, 4, 3]);
     assert_eq!(decoder.repeat(), gif::Repeat::Infinite);
-    assert_eq!(folder.names(), ["film.GIF"]);
+    assert_eq!(folder.names(), ["movie.GIF"]);
 }
 
 #[test]
@@ -162,13 +162,13 @@ fn frame_numbers_have_as_many_digits_as_the_pattern() {
 
 #[test]
 fn a_resumed_run_gives_the_same_bytes() {
-    check_resumed_movies(&["film.png", "film.gif", "frame_####.png", "frame_##.exr"]);
+    check_resumed_movies(&["movie.png", "movie.gif", "frame_####.png", "frame_##.exr"]);
 }
 
 #[test]
 fn a_resumed_video_gives_the_same_bytes() {
     if has_ffmpeg() {
-        check_resumed_movies(&["film.mp4", "film.mov", "film.mkv", "film.webm", "film.avi"]);
+        check_resumed_movies(&["movie.mp4", "movie.mov", "movie.mkv", "movie.webm", "movie.avi"]);
     }
 }
 
@@ -196,7 +196,7 @@ fn check_resumed_movies(names: &[&str]) {
 
 #[test]
 fn frames_with_other_settings_are_not_reused() {
-    for name in ["film.gif", "frame_####.png"] {
+    for name in ["movie.gif", "frame_####.png"] {
         let folder = Folder::new(&format!("settings-{name}"));
         let (path, first) = (folder.path(name), options());
         let mut movie = Movie::open(&path, &first, true).unwrap();
@@ -245,11 +245,11 @@ fn images_of_an_older_movie_do_not_count_as_done() {
 #[test]
 fn a_truncated_log_line_does_not_count() {
     let folder = Folder::new("torn");
-    let (path, options) = (folder.path("film.gif"), options());
+    let (path, options) = (folder.path("movie.gif"), options());
     let mut movie = Movie::open(&path, &options, false).unwrap();
     add_missing(&mut movie, &options, 3);
     drop(movie);
-    let note = folder.path("film.gif.frames/settings");
+    let note = folder.path("movie.gif.frames/settings");
     let text = fs::read_to_string(&note).unwrap();
     let settings = text.lines().next().unwrap();
     for (frames, n_done) in [("1\n2", 1), ("1\n\n0\n-1\n99999999999\nx\n3\n", 2), ("", 0)] {
@@ -263,7 +263,7 @@ fn a_truncated_log_line_does_not_count() {
 
 #[test]
 fn a_movie_without_frames_leaves_no_files() {
-    for name in ["film.png", "frame_####.exr"] {
+    for name in ["movie.png", "frame_####.exr"] {
         let folder = Folder::new(&format!("nothing-{name}"));
         drop(Movie::open(&folder.path(name), &options(), false).unwrap());
         assert_eq!(folder.names(), [""; 0]);
@@ -273,8 +273,8 @@ fn a_movie_without_frames_leaves_no_files() {
 #[test]
 fn foreign_files_are_never_removed() {
     let folder = Folder::new("foreign");
-    let (path, options) = (folder.path("film.gif"), options());
-    let frames = folder.path("film.gif.frames");
+    let (path, options) = (folder.path("movie.gif"), options());
+    let frames = folder.path("movie.gif.frames");
     let refused = || match Movie::open(&path, &options, false) {
         Err(Error::InvalidFrames { found, .. }) => found,
         Err(other) => panic!("{other}"),
@@ -299,7 +299,7 @@ fn foreign_files_are_never_removed() {
 
 #[test]
 fn a_malformed_frame_is_reported_and_can_be_rendered_again() {
-    for name in ["film.gif", "film.png"] {
+    for name in ["movie.gif", "movie.png"] {
         let folder = Folder::new(&format!("broken-{name}"));
         let (path, options) = (folder.path(name), options());
         fs::write(&path, "old").unwrap();
@@ -328,7 +328,7 @@ fn a_malformed_frame_is_reported_and_can_be_rendered_again() {
 #[test]
 fn cancelling_finish_keeps_the_frames_and_the_old_movie() {
     let folder = Folder::new("cancelled");
-    let (path, options) = (folder.path("film.gif"), options());
+    let (path, options) = (folder.path("movie.gif"), options());
     fs::write(&path, "old").unwrap();
     let mut movie = Movie::open(&path, &options, false).unwrap();
     add_missing(&mut movie, &options, 9);
@@ -339,14 +339,14 @@ fn cancelling_finish_keeps_the_frames_and_the_old_movie() {
     let movie = Movie::open(&path, &options, true).unwrap();
     assert_eq!(movie.n_done(), 5);
     movie.finish(&NoProgress).unwrap();
-    assert_eq!(folder.names(), ["film.gif"]);
+    assert_eq!(folder.names(), ["movie.gif"]);
 }
 
 #[test]
 fn frames_of_another_index_or_size_are_rejected() {
     let folder = Folder::new("unannounced");
     let options = options();
-    let mut movie = Movie::open(&folder.path("film.gif"), &options, false).unwrap();
+    let mut movie = Movie::open(&folder.path("movie.gif"), &options, false).unwrap();
     for (frame, width) in [(5, 48), (0, 47)] {
         let error = movie.add_frame(frame, &Image::new(width, 32)).unwrap_err().to_string();
         assert!(error.contains("expected frames 0 to 4 of 48x32"), "{error}");
@@ -360,25 +360,25 @@ fn check_movie_rejects_unwritable_movies() {
     let message = |name: &str, options: &MovieOptions| {
         check_movie(&folder.path(name), options).unwrap_err().to_string()
     };
-    for name in ["film.mpg", "film", "film.exr", "####", "frame_####.jpg", "-"] {
+    for name in ["movie.mpg", "movie", "movie.exr", "####", "frame_####.jpg", "-"] {
         let message = message(name, &options());
         for part in ["cannot write", ".mp4", ".gif", ".png (animated)", "frame_####.exr"] {
             assert!(message.contains(part), "{message}");
         }
     }
-    assert!(message("none/film.gif", &options()).contains("create it first"));
+    assert!(message("none/movie.gif", &options()).contains("create it first"));
     assert!(message("none/frame_####.png", &options()).contains("create it first"));
     fs::create_dir(folder.path("folder.gif")).unwrap();
     assert!(message("folder.gif", &options()).contains("name a file, not a folder"));
     let fast = MovieOptions { fps: 60.0, ..options() };
-    assert!(message("film.gif", &fast).contains("at most 50 times a second"));
-    check_movie(&folder.path("film.png"), &fast).unwrap();
+    assert!(message("movie.gif", &fast).contains("at most 50 times a second"));
+    check_movie(&folder.path("movie.png"), &fast).unwrap();
     for fps in [0.0, -30.0, f64::NAN, f64::INFINITY, 1e-9, 1e9] {
         let options = MovieOptions { fps, ..options() };
-        assert!(message("film.png", &options).contains("frames a second"));
+        assert!(message("movie.png", &options).contains("frames a second"));
     }
     for (name, width, n_frames) in
-        [("film.png", 0, 1), ("film.gif", 65536, 1), ("a_#.png", 1 << 31, 1), ("a_#.png", 1, 0)]
+        [("movie.png", 0, 1), ("movie.gif", 65536, 1), ("a_#.png", 1 << 31, 1), ("a_#.png", 1, 0)]
     {
         let options = MovieOptions { width, n_frames, ..options() };
         assert!(message(name, &options).contains("choose"));
@@ -394,7 +394,7 @@ fn ffmpeg_encodes_every_video_format() {
     let folder = Folder::new("ffmpeg");
     // ffmpeg interprets a colon as a protocol separator and a percent sign as a number placeholder.
     let odd = if cfg!(windows) { "a%d.mov" } else { "a:%d.mov" };
-    for name in ["film.mp4", odd, "-film.mkv", "film.webm", "film.avi"] {
+    for name in ["movie.mp4", odd, "-movie.mkv", "movie.webm", "movie.avi"] {
         for (width, height) in [(48, 32), (47, 31)] {
             let path = folder.path(name);
             let options = MovieOptions { width, height, fps: 29.97, ..options() };
@@ -435,7 +435,7 @@ fn check_movie_rejects_sizes_that_ffmpeg_does_not_support() {
     }
     let folder = Folder::new("refused-size");
     let options = MovieOptions { width: 20_000, height: 2, ..options() };
-    let error = check_movie(&folder.path("film.mp4"), &options).unwrap_err();
+    let error = check_movie(&folder.path("movie.mp4"), &options).unwrap_err();
     assert!(matches!(error, Error::EncoderFailed { .. }), "{error}");
     assert_eq!(folder.names(), [""; 0]);
 }

@@ -21,7 +21,7 @@ from surfel._errors import (
 )
 from surfel._native import (
     Cloud,
-    Film,
+    Movie,
     HeightMap,
     Image,
     Mesh,
@@ -40,7 +40,7 @@ __all__ = [
     "Cloud",
     "EncoderError",
     "Error",
-    "Film",
+    "Movie",
     "HeightMap",
     "Image",
     "InaccessibleFile",

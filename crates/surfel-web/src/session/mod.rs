@@ -13,7 +13,7 @@ use crate::message::Incoming;
 use crate::outgoing::{Outgoing, RequestRef, rejection, send_json, write};
 use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::profile;
-use crate::scene_provider::{Error, FilmOptions, Result, SceneProvider, SettingsMap, WrittenFile};
+use crate::scene_provider::{Error, MovieRequest, Result, SceneProvider, SettingsMap, WrittenFile};
 use crate::scene_update;
 use crate::server_state::ServerState;
 use crate::volume;
@@ -80,6 +80,23 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
     writer.abort();
 }
 
+/// The kinds of files that a page requests; it has one of each.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum FileKind {
+    Points,
+    Movie,
+}
+
+impl FileKind {
+    /// Returns the type of its messages, and their field for the number of items.
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Points => ("points", "n_points"),
+            Self::Movie => ("movie", "n_frames"),
+        }
+    }
+}
+
 struct Session {
     state: Arc<ServerState>,
     client: Arc<Client>,
@@ -87,12 +104,12 @@ struct Session {
     out: mpsc::Sender<Outgoing>,
     /// One permit for each question about points that is being answered.
     queries: Arc<Semaphore>,
-    /// The permit for the saved picture, film or file of points that is being made; others of the page wait for it.
+    /// The permit for the saved picture, movie or file of points that is being made; others of the page wait for it.
     save_permit: Arc<Semaphore>,
-    /// The cancellation flags of saved pictures, films and files of points that are not sent completely, by request id.
+    /// The cancellation flags of saved pictures, movies and files of points that are not sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
-    /// The file of points and the film that the page requested last, by the words for what is in them.
-    downloads: Arc<Mutex<HashMap<&'static str, DownloadGuard>>>,
+    /// The file of points and the movie that the page requested last.
+    downloads: Arc<Mutex<HashMap<FileKind, DownloadGuard>>>,
     /// The files that the page has added.
     files: Arc<PageFiles>,
     /// Sequence number of the last camera or settings change.
@@ -174,8 +191,8 @@ impl Session {
             Incoming::Histogram { id, column } => self.histogram(id, column).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
             Incoming::Points { id, format } => self.points(id, format).await,
-            Incoming::Film { id, format, width, height, fps } => {
-                self.film(id, (width, height), FilmOptions { format, fps }).await;
+            Incoming::Movie { id, format, width, height, fps } => {
+                self.movie(id, (width, height), MovieRequest { format, fps }).await;
             }
             Incoming::AddFile { id, name, n_bytes } => {
                 self.add_file(Announcement { id, name, n_bytes }).await;
@@ -247,6 +264,13 @@ impl Session {
         Ok(())
     }
 
+    /// Returns the flag that cancels the work on a file.
+    fn begin_save(&mut self, id: u32) -> Arc<AtomicBool> {
+        let is_cancelled: Arc<AtomicBool> = Arc::default();
+        self.saves.insert(id, is_cancelled.clone());
+        is_cancelled
+    }
+
     fn settings_to_save(&mut self, id: u32, (width, height): (u32, u32)) -> Result<SettingsMap> {
         self.check_saves(id)?;
         let settings = self.settings(width, height);
@@ -258,8 +282,7 @@ impl Session {
         if let Err(error) = self.check_saves(id) {
             return self.reject(RequestRef::Id(id), &error).await;
         }
-        let is_cancelled: Arc<AtomicBool> = Arc::default();
-        self.saves.insert(id, is_cancelled.clone());
+        let is_cancelled = self.begin_save(id);
         let (state, files, out) = (self.state.clone(), self.files.clone(), self.out.clone());
         tokio::spawn(async move {
             let added = add_file::run(&state, announced, &files, is_cancelled, &out).await;
@@ -274,8 +297,7 @@ impl Session {
             Ok(settings) => settings,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
         };
-        let is_cancelled: Arc<AtomicBool> = Arc::default();
-        self.saves.insert(id, is_cancelled.clone());
+        let is_cancelled = self.begin_save(id);
         let (state, out, permit) = (self.state.clone(), self.out.clone(), self.save_permit.clone());
         tokio::spawn(async move {
             let render = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
@@ -300,30 +322,29 @@ impl Session {
     /// Writes the points that are shown.
     async fn points(&mut self, id: u32, format: String) {
         let size = self.client.view().size;
-        self.write_file(id, size, "n_points", move |provider, settings, progress| {
+        self.write_file(id, size, FileKind::Points, move |provider, settings, progress| {
             provider.write_points(settings, &format, progress)
         })
         .await;
     }
 
-    /// Writes the film of the camera's path.
-    async fn film(&mut self, id: u32, size: (u32, u32), options: FilmOptions) {
+    /// Writes the movie of the camera's path.
+    async fn movie(&mut self, id: u32, size: (u32, u32), options: MovieRequest) {
         if let Err(error) = self.state.limits.check_save_size(size.0, size.1) {
             return self.reject(RequestRef::Id(id), &error).await;
         }
-        self.write_file(id, size, "n_frames", move |provider, settings, progress| {
-            provider.write_film(&provider.drawable_settings(settings), &options, progress)
+        self.write_file(id, size, FileKind::Movie, move |provider, settings, progress| {
+            provider.write_movie(&provider.drawable_settings(settings), &options, progress)
         })
         .await;
     }
 
-    /// Writes a file, which the page then fetches by its name. `count` is the word for what is in it, and replaces the
-    /// page's file with the same word.
+    /// Writes a file, which the page then fetches by its name. It replaces the page's file of the same kind.
     async fn write_file(
         &mut self,
         id: u32,
         size: (u32, u32),
-        count: &'static str,
+        kind: FileKind,
         write: impl FnOnce(
             &dyn SceneProvider,
             &SettingsMap,
@@ -336,8 +357,7 @@ impl Session {
             Ok(settings) => settings,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
         };
-        let is_cancelled: Arc<AtomicBool> = Arc::default();
-        self.saves.insert(id, is_cancelled.clone());
+        let is_cancelled = self.begin_save(id);
         let (state, out) = (self.state.clone(), self.out.clone());
         let downloads = self.downloads.clone();
         let permit = self.save_permit.clone();
@@ -353,10 +373,11 @@ impl Session {
             });
             let message = match kept {
                 Ok((guard, file)) => {
-                    let address = format!("points/{}", guard.name);
+                    let address = format!("downloads/{}", guard.name);
                     // The file of this kind before it goes.
-                    downloads.lock().unwrap_or_else(PoisonError::into_inner).insert(count, guard);
-                    json!({ "type": "written", "id": id, "address": address, count: file.n_items(), "n_bytes": file.n_bytes() })
+                    downloads.lock().unwrap_or_else(PoisonError::into_inner).insert(kind, guard);
+                    let (name, count) = kind.words();
+                    json!({ "type": name, "id": id, "address": address, count: file.n_items(), "n_bytes": file.n_bytes() })
                 }
                 Err(error) => rejection(RequestRef::Id(id), &error),
             };
@@ -374,12 +395,12 @@ impl Session {
         let export = self.state.run_blocking(export).await;
         let message = match export.flatten() {
             Ok(export) => json!({
-                "type": "exported",
+                "type": "export",
                 "id": id,
                 "command": export.command,
                 "toml": export.toml,
                 "json": export.json,
-                "film": export.film,
+                "movie": export.movie,
             }),
             Err(error) => rejection(RequestRef::Id(id), &error),
         };

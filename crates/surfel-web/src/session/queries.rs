@@ -19,7 +19,7 @@ impl Session {
         let pick = move |progress: &dyn Progress| {
             let picked = pick::pick(&*renderer, &client.view(), pixel, progress);
             let point = picked.map(|(scene, point)| (scene.describe)(&scene.flat, &point));
-            Ok(json!({ "type": "picked", "id": id, "point": point }))
+            Ok(json!({ "type": "pick", "id": id, "point": point }))
         };
         self.answer(id, pick).await;
     }
@@ -28,7 +28,7 @@ impl Session {
         let view = self.client.view();
         let find = move |_: &dyn Progress| {
             let visible = visibility(&view, &points)?;
-            Ok(json!({ "type": "seen", "id": id, "visible": visible }))
+            Ok(json!({ "type": "visible", "id": id, "visible": visible }))
         };
         self.answer(id, find).await;
     }
@@ -40,7 +40,7 @@ impl Session {
         };
         let find = move |progress: &dyn Progress| {
             let profile = profile::profile(&scene, &line, progress)?;
-            Ok(json!({ "type": "profiled", "id": id, "profile": profile }))
+            Ok(json!({ "type": "profile", "id": id, "profile": profile }))
         };
         self.answer(id, find).await;
     }
@@ -52,7 +52,7 @@ impl Session {
         };
         let find = move |progress: &dyn Progress| {
             let volume = volume::volume(&scene, &query, progress)?;
-            Ok(json!({ "type": "measured", "id": id, "volume": volume }))
+            Ok(json!({ "type": "volume", "id": id, "volume": volume }))
         };
         self.answer(id, find).await;
     }
@@ -64,7 +64,7 @@ impl Session {
         };
         let find = move |_: &dyn Progress| {
             let histogram = provider.histogram(&column)?;
-            Ok(json!({ "type": "counted", "id": id, "histogram": histogram }))
+            Ok(json!({ "type": "histogram", "id": id, "histogram": histogram }))
         };
         self.answer(id, find).await;
     }

@@ -64,7 +64,7 @@ impl Random {
             "volume",
             "histogram",
             "points",
-            "film",
+            "movie",
             "addFile",
             "save",
             "cancel",
@@ -257,7 +257,7 @@ async fn floods_of_requests_do_not_block_other_pages() {
     let mut other = TestPage::open(&server, json!({})).await;
     other.finished_picture().await;
     other.send_json(json!({ "type": "pick", "id": 1, "x": 32, "y": 24 })).await;
-    other.message("picked").await;
+    other.message("pick").await;
     drop(page);
     assert_healthy(&server).await;
 }
@@ -286,9 +286,8 @@ async fn floods_are_answered_and_pictures_go_on() {
 async fn messages_with_wrong_fields_are_answered() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;
-    let film =
-        json!({ "type": "film", "id": 7, "format": "gif", "width": 1280.5, "height": 2, "fps": 5 });
-    page.send_json(film).await;
+    let movie = json!({ "type": "movie", "id": 7, "format": "gif", "width": 1280.5, "height": 2, "fps": 5 });
+    page.send_json(movie).await;
     assert_eq!(page.message("error").await["id"], 7);
     page.send_json(json!({ "type": "set", "seq": 8, "scene": [] })).await;
     assert_eq!(page.message("error").await["seq"], 8);

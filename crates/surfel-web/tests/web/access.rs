@@ -12,7 +12,7 @@ use tokio::net::TcpStream;
 
 /// Paths of all kinds of requests.
 const PATHS: [&str; 9] =
-    ["/", "/ws", "/render", "/points/x", "/files/x", "/scene", "/stats", "/healthz", "/nothing"];
+    ["/", "/ws", "/render", "/downloads/x", "/files/x", "/scene", "/stats", "/healthz", "/nothing"];
 
 async fn get_with(server: &TestServer, path: &str, headers: &str) -> Response {
     request(server, &format!("GET {path} HTTP/1.1\r\n{headers}\r\n"), b"").await
@@ -74,7 +74,7 @@ async fn an_image_of_a_foreign_page_renders_nothing() {
         assert_denied(&server, "/render?slow=1", &image).await;
     }
     let referer = "Host: localhost\r\nReferer: https://evil.example/page";
-    for path in ["/render", "/ws", "/points/x", "/scene", "/stats", "/render?slow=1"] {
+    for path in ["/render", "/ws", "/downloads/x", "/scene", "/stats", "/render?slow=1"] {
         assert_denied(&server, path, referer).await;
     }
     assert_eq!(server.provider.n_started.load(Ordering::Relaxed), 0);
@@ -119,7 +119,7 @@ async fn beyond_loopback_a_token_is_required() {
     let token = server.token();
     assert_eq!(token.len(), 32);
     TestPage::open(&server, json!({})).await.finished_picture().await;
-    for path in ["/ws", "/render", "/points/x", "/scene", "/stats"] {
+    for path in ["/ws", "/render", "/downloads/x", "/scene", "/stats"] {
         for query in ["", "?token=", "?token=0", "?Token=x", &format!("?token={token}0")] {
             let response = get(&server, &format!("{path}{query}")).await;
             let is_error = response.json()["error"].is_string();

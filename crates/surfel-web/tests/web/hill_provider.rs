@@ -19,7 +19,7 @@ use surfel_core::scene::{
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_web::{
-    AddedFile, Error, Export, FilmOptions, PictureOverlay, PicturePart, PreparedScene, Result,
+    AddedFile, Error, Export, MovieRequest, PictureOverlay, PicturePart, PreparedScene, Result,
     SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
@@ -322,10 +322,10 @@ impl SceneProvider for HillProvider {
         }
     }
 
-    fn write_film(
+    fn write_movie(
         &self,
         settings: &SettingsMap,
-        options: &FilmOptions,
+        options: &MovieRequest,
         progress: &dyn Progress,
     ) -> Result<Arc<dyn WrittenFile>> {
         self.write_points(settings, if options.format == "gif" { "laz" } else { "" }, progress)
@@ -350,7 +350,7 @@ impl SceneProvider for HillProvider {
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let json = Value::Object(settings.clone()).to_string();
-        Ok(Export { command: "surfel render hill".into(), toml: String::new(), json, film: None })
+        Ok(Export { command: "surfel render hill".into(), toml: String::new(), json, movie: None })
     }
 
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {

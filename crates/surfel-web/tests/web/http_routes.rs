@@ -70,7 +70,7 @@ async fn invalid_queries_are_errors() {
     let deep = "[".repeat(200_000);
     for (response, status) in [
         (get(&server, "/render?invalid=1").await, 400),
-        (get(&server, "/render?panic=1").await, 400),
+        (get(&server, "/render?panic=1").await, 500),
         (post(&server, "/render", b"{").await, 400),
         (post(&server, "/render", b"7").await, 400),
         (post(&server, "/render", deep.as_bytes()).await, 400),

@@ -72,7 +72,7 @@ async fn frames_are_for_pages_of_allowed_origins() {
     let policy = page.header("content-security-policy").unwrap();
     assert_eq!(page.status, 200);
     assert!(policy.ends_with("; frame-ancestors http://localhost:8888"), "{policy}");
-    for path in ["/ws", "/render", "/points/x", "/scene", "/stats", "/healthz"] {
+    for path in ["/ws", "/render", "/downloads/x", "/scene", "/stats", "/healthz"] {
         assert_eq!(get(&server, path, frame).await.status, 403, "{path}");
     }
 }

@@ -114,7 +114,7 @@ async fn picks_return_points_or_null() {
         [(1, 32.5, true), (2, -1.0, false), (3, 1e300, false), (4, 64.0, false)]
     {
         page.send_json(json!({ "type": "pick", "id": id, "x": x, "y": 24.5 })).await;
-        let picked = page.message("picked").await;
+        let picked = page.message("pick").await;
         assert_eq!((&picked["id"], picked["point"].is_object()), (&json!(id), is_found));
     }
 }
@@ -126,7 +126,7 @@ async fn profiles_have_the_points_beside_their_line() {
     page.finished_picture().await;
     let request = |id: u32, points: Value| json!({ "type": "profile", "id": id, "points": points, "width": 0.05, "up": [0, 0, 1] });
     page.send_json(request(1, json!([[-1.001, 0, 7], [1, 0, 9]]))).await;
-    let profiled = page.message("profiled").await;
+    let profiled = page.message("profile").await;
     let profile = &profiled["profile"];
     assert_eq!((&profiled["id"], &profile["n_found"]), (&json!(1), &json!(50)));
     let numbers = |name: &str, i: usize| profile[name][i].as_f64().unwrap();
@@ -155,7 +155,7 @@ async fn pages_learn_which_points_are_hidden() {
     // On the hill, below it, beside it, and behind the camera.
     let points = json!([[0, 0, 0.5], [0, 0, -0.5], [3, 0, 0], [0, -20, 12]]);
     page.send_json(request(1, points)).await;
-    let seen = page.message("seen").await;
+    let seen = page.message("visible").await;
     assert_eq!((&seen["id"], &seen["visible"]), (&json!(1), &json!([true, false, true, true])));
     for invalid in [json!(vec![[0; 3]; 2001]), json!([["x", 0, 0]])] {
         page.send_json(request(2, invalid)).await;
@@ -241,7 +241,7 @@ async fn settings_are_exported_and_loaded() {
     let mut page = TestPage::open(&server, json!({})).await;
     page.finished_picture().await;
     page.send_json(json!({ "type": "export", "id": 1, "width": 30, "height": 20 })).await;
-    let exported = page.message("exported").await;
+    let exported = page.message("export").await;
     assert_eq!((&exported["id"], &exported["command"]), (&json!(1), &json!("surfel render hill")));
     assert!(exported["json"].as_str().unwrap().contains(r#""resolution":"30x20""#));
     let load = |id: u32, text: &str| json!({ "type": "loadScene", "id": id, "name": "a.json", "text": text });
@@ -289,14 +289,14 @@ async fn histograms_and_volumes_are_answered() {
     let mut page = TestPage::open(&server, json!({})).await;
     page.message("scene").await;
     page.send_json(json!({ "type": "histogram", "id": 4, "column": "z" })).await;
-    let counted = page.message("counted").await;
+    let counted = page.message("histogram").await;
     assert_eq!((&counted["id"], &counted["histogram"]["counts"]), (&json!(4), &json!([3, 0, 1])));
     page.send_json(json!({ "type": "histogram", "id": 5, "column": "wind" })).await;
     assert_eq!(page.message("error").await["id"], 5);
     let corners = json!([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]);
     let volume = |id: u32, points: &Value, base: Value| json!({ "type": "volume", "id": id, "points": points, "up": [0, 0, 1], "base": base });
     page.send_json(volume(6, &corners, json!(-2))).await;
-    let measured = page.message("measured").await;
+    let measured = page.message("volume").await;
     assert_eq!((&measured["id"], &measured["volume"]["base"]), (&json!(6), &json!(-2.0)));
     assert!(0.0 < measured["volume"]["cut"].as_f64().unwrap(), "{measured}");
     let on_a_line = json!([[0, 0, 0], [1, 1, 0], [2, 2, 5]]);
@@ -316,24 +316,24 @@ async fn points_are_fetched_until_their_page_goes() {
     let mut addresses = Vec::new();
     for id in [2, 3] {
         page.send_json(json!({ "type": "points", "id": id, "format": "laz" })).await;
-        let written = page.message("written").await;
+        let written = page.message("points").await;
         assert_eq!((&written["id"], &written["n_points"]), (&json!(id), &json!(7)));
         addresses.push(format!("/{}", written["address"].as_str().unwrap()));
     }
     page.send_json(
-        json!({ "type": "film", "id": 4, "format": "gif", "width": 3, "height": 2, "fps": 5 }),
+        json!({ "type": "movie", "id": 4, "format": "gif", "width": 3, "height": 2, "fps": 5 }),
     )
     .await;
-    let film = page.message_of(4).await;
-    assert_eq!((&film["type"], &film["n_frames"]), (&json!("written"), &json!(7)), "{film}");
-    // A film replaces no file of points.
+    let movie = page.message_of(4).await;
+    assert_eq!((&movie["type"], &movie["n_frames"]), (&json!("movie"), &json!(7)), "{movie}");
+    // A movie replaces no file of points.
     let file = get(&server, &addresses[1]).await;
     assert_eq!((file.status, file.header("content-length")), (200, Some("1000000")));
     assert_eq!(file.header("content-disposition"), Some("attachment"));
     assert!(file.body.iter().all(|byte| *byte == b'x') && file.body.len() == 1_000_000);
     // A newer file replaces the older one.
     assert_eq!(get(&server, &addresses[0]).await.status, 404);
-    assert_eq!(get(&server, "/points/x").await.status, 404);
+    assert_eq!(get(&server, "/downloads/x").await.status, 404);
     drop(page);
     while get(&server, &addresses[1]).await.status != 404 {
         tokio::time::sleep(Duration::from_millis(10)).await;

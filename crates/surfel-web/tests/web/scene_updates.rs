@@ -89,7 +89,7 @@ async fn an_animated_camera_moves_unless_the_user_has_moved_it_meanwhile() {
     let condition = |picture: &Picture| picture.is_finished && picture.seq == 4;
     assert_eq!(page.wait_for_picture(condition).await.files, first.files);
     page.send_json(json!({ "type": "export", "id": 1, "width": 30, "height": 20 })).await;
-    let exported = page.message("exported").await;
+    let exported = page.message("export").await;
     let exported: Value = serde_json::from_str(exported["json"].as_str().unwrap()).unwrap();
     assert_eq!(exported["camera"], camera(1.0));
 }
@@ -151,7 +151,7 @@ async fn blocked_preparation_does_not_block_other_pages() {
         page.wait_for_picture(|picture| picture.seq == seq).await;
     }
     page.send_json(json!({ "type": "pick", "id": 1, "x": 32, "y": 24 })).await;
-    page.message("picked").await;
+    page.message("pick").await;
     page.change_settings(9, json!({ "tint": 1 })).await;
     assert_eq!(page.message("scene").await["seq"], 9);
 }

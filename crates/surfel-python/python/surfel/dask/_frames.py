@@ -1,4 +1,4 @@
-"""Frames of a film."""
+"""Frames of a movie."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from surfel.dask._recipe import ClusterLost, Recipe, check_recipe
 
 
 def render_frames(recipe: Recipe, frames: Iterable[int], *, format: str = "png") -> list[Delayed]:
-    """Frames of the recipe's film as a list of `dask.delayed` bytes, each a file of this format.
+    """Frames of the recipe's movie as a list of `dask.delayed` bytes, each a file of this format.
 
     `frames`: indices from 0, as `range(100)`. The recipe needs `turntable`, or a scene that moves.
 
@@ -45,7 +45,7 @@ def _indices(frames: Iterable[int]) -> list[int]:
 def save_frames(recipe: Recipe, frames: Iterable[int], pattern: str | os.PathLike[str]) -> list[str]:
     """Renders frames and writes each to a file of this machine, `####` in whose name is its number from 1.
 
-    Returns the names. Frames that a call with the same recipe has written are kept, so that an interrupted film goes on;
+    Returns the names. Frames that a call with the same recipe has written are kept, so that an interrupted movie goes on;
     the file `.PATTERN.recipe` beside them lists them.
 
     Raises `InvalidSetting` for a pattern without `#` and as `render_frames` does, `InaccessibleFile` if there is no such
@@ -94,9 +94,9 @@ def completed(client: Any, indices: Iterable[int], pictures: list[Delayed]) -> I
 
 
 def _frame(recipe: Recipe, index: int, format: str) -> bytes:
-    # A film ends where the recipe says; an index beyond is the caller's mistake.
-    film = _worker.film(recipe)
-    return _worker.bytes_of_file(format, lambda path: film._save(index, path))
+    # A movie ends where the recipe says; an index beyond is the caller's mistake.
+    movie = _worker.movie(recipe)
+    return _worker.bytes_of_file(format, lambda path: movie._save(index, path))
 
 
 def _frame_name(pattern: str, index: int) -> str:

@@ -1,4 +1,4 @@
-"""The cache of a worker: prepared scenes and films, the last used ones, as many as memory allows."""
+"""The cache of a worker: prepared scenes and movies, the last used ones, as many as memory allows."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def scene(recipe: Recipe) -> surfel.Scene:
     return kept
 
 
-def film(recipe: Recipe) -> surfel.Film:
-    """The film of a recipe, which is made unless it is kept."""
-    kept: surfel.Film = _KEPT.get(("film", recipe), lambda: surfel.Film(recipe.scene()))
+def movie(recipe: Recipe) -> surfel.Movie:
+    """The movie of a recipe, which is made unless it is kept."""
+    kept: surfel.Movie = _KEPT.get(("movie", recipe), lambda: surfel.Movie(recipe.scene()))
     return kept
 
 
