@@ -45,7 +45,6 @@ pub mod math;
 pub mod progress;
 pub mod image;
 pub mod points;
-pub mod scanner;
 pub mod bvh;
 pub mod surface;
 pub mod scene;

@@ -177,9 +177,6 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::points::{STATION, Scalar, ScanStation, Values};
-    use crate::progress::NoProgress;
-    use crate::scanner::scenes::street;
-    use crate::scanner::{Instrument, SpinningLidar, TerrestrialSurvey};
 
     /// A sweep of a street along `azimuth_deg`, 8 m wide, from 2 m above the ground: every 2 degrees of elevation.
     fn street_sweep(azimuth_deg: f32) -> PointCloud {
@@ -238,27 +235,6 @@ mod tests {
         cloud.rebase(DVec3::ZERO);
         cloud.origin = DVec3::new(500_000.0, 5_400_000.0, 300.0);
         assert_eq!(find_station(&cloud, Vec3::Z), None);
-    }
-
-    #[test]
-    fn scanners_have_a_station() {
-        let scene = street::scene().sdf;
-        let standing = street::spinning().path[0];
-        let spinning = SpinningLidar { path: vec![standing], ..SpinningLidar::default() };
-        let survey = street::terrestrial(0.5);
-        let positions = survey.stations.iter().map(|station| station.position);
-        let surveys = survey.stations.iter().map(|station| {
-            let stations = vec![station.clone()];
-            TerrestrialSurvey { stations, scanner: survey.scanner.clone() }
-        });
-        let swept = (spinning.scan(&scene, &NoProgress).unwrap(), standing);
-        let scans = surveys.map(|survey| survey.scan(&scene, &NoProgress).unwrap()).zip(positions);
-        for (mut scan, position) in scans.chain([swept]) {
-            // The file states no station.
-            scan.stations.clear();
-            scan.origin -= position;
-            assert!(find_station(&scan, Vec3::Z).is_some(), "{position}");
-        }
     }
 
     /// A floor 1 m below a depth camera and a wall 8 m ahead, seen by a grid of rays; or an even part of the floor.
