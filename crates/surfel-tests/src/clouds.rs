@@ -59,6 +59,18 @@ pub fn cube(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     with_normals(positions, normals)
 }
 
+/// Returns the faces of the cube of side 2 as lattices of `n_side` x `n_side` points, of which the outermost lie on the edges,
+/// with outward normals.
+pub fn cube_with_edges(n_side: usize) -> PointCloud {
+    let mut cloud = cube(n_side, 0.0, 0);
+    let stretch = n_side as f32 / (n_side - 1) as f32;
+    for position in &mut cloud.positions {
+        // The points on a face lie half a spacing within its edges.
+        *position = (stretch * *position).clamp(-Vec3::ONE, Vec3::ONE);
+    }
+    cloud
+}
+
 /// Returns `n` points of the X axis from -1 to 1, without normals.
 pub fn line(n: usize) -> PointCloud {
     let step = 2.0 / (n.max(2) - 1) as f32;
@@ -127,6 +139,13 @@ mod tests {
         }
         let sum = normals(&cloud).iter().copied().sum::<Vec3>();
         assert_eq!(sum, Vec3::ZERO);
+    }
+
+    #[test]
+    fn outermost_points_of_a_cube_with_edges_lie_on_them() {
+        let cloud = cube_with_edges(5);
+        let is_on_edge = |p: &&Vec3| 2 <= p.abs().to_array().iter().filter(|x| **x == 1.0).count();
+        assert_eq!(cloud.positions.iter().filter(is_on_edge).count(), 6 * 16);
     }
 
     #[test]

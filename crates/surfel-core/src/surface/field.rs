@@ -9,6 +9,10 @@ pub const FIELD_SUPPORT: f32 = 1.2;
 /// Minimum weight of all points at a position where the field has a value.
 pub const MIN_FIELD_WEIGHT: f32 = 0.05;
 
+/// Least distance of a point from the plane of another, relative to the distance between them, that tells the side of an
+/// edge. Positions and normals are stored with errors a tenth as large.
+const MIN_HEIGHT: f32 = 0.02;
+
 /// A point of the field.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FieldPoint {
@@ -81,6 +85,9 @@ impl FieldPoint {
             return cosine < 0.0;
         }
         let offset = guide.center - self.center;
-        (self.normal.dot(offset) < 0.0) != (guide.normal.dot(-offset) < 0.0)
+        let heights = [self.normal.dot(offset), guide.normal.dot(-offset)];
+        // Points on the edge itself tell nothing.
+        let tells = heights.iter().all(|height| MIN_HEIGHT * offset.length() < height.abs());
+        tells && (heights[0] < 0.0) != (heights[1] < 0.0)
     }
 }

@@ -145,6 +145,12 @@ impl<F: Floats> SphereSums<F> {
         }
     }
 
+    /// Returns the weighted mean of the points relative to the positions: on the side of an edge that is hit, and within it.
+    #[inline(always)]
+    pub fn mean_offset(&self) -> Vec3Lanes<F> {
+        self.offset.scaled(F::splat(1.0) / (self.weight * self.per_radius))
+    }
+
     /// Fits a sphere to the points and intersects it with rays through the positions along unit vectors
     /// `direction`.
     #[inline(always)]
@@ -218,8 +224,8 @@ impl<F: Floats> PointSums<F> for SphereSums<F> {
 pub struct OverhangSums<F> {
     /// Unit normals of the hits, facing the rays' origins.
     normal: Vec3Lanes<F>,
-    /// Centres of the discs that were hit, relative to the hits.
-    center: Vec3Lanes<F>,
+    /// Means of the points on the side of the edge that was hit, relative to the hits.
+    inside: Vec3Lanes<F>,
     /// Reciprocal of the radius of the disc that was hit: heights are in radii.
     per_radius: F,
     weight: F,
@@ -227,12 +233,12 @@ pub struct OverhangSums<F> {
 }
 
 impl<F: Floats> OverhangSums<F> {
-    /// Returns the sums over no points, for hits with unit normals on discs of `radius` whose centres are at `center`
-    /// relative to the hits.
+    /// Returns the sums over no points, for hits with unit normals on discs of `radius`, and the means of the points of
+    /// their fits relative to the hits.
     #[inline(always)]
-    pub fn new(normal: Vec3Lanes<F>, center: Vec3Lanes<F>, radius: F) -> Self {
+    pub fn new(normal: Vec3Lanes<F>, inside: Vec3Lanes<F>, radius: F) -> Self {
         let zero = F::splat(0.0);
-        Self { normal, center, per_radius: F::splat(1.0) / radius, weight: zero, height: zero }
+        Self { normal, inside, per_radius: F::splat(1.0) / radius, weight: zero, height: zero }
     }
 
     /// Returns the lanes in which the hit sticks out.
@@ -250,15 +256,16 @@ impl<F: Floats> PointSums<F> for OverhangSums<F> {
     }
 
     /// A point counts if it is on the other side of an edge: its normal is far from that of the hit, and it lies below the
-    /// hit's tangent plane. Its own plane has the centre of the disc below it.
+    /// hit's tangent plane. Its own plane has the points of the fit below it. The centre of the disc would not do: it may lie
+    /// on the edge.
     #[inline(always)]
     fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
         let zero = F::splat(0.0);
         let is_other_side = point.normal.dot(self.normal).abs().lt(F::splat(MAX_EDGE_COSINE))
             & self.normal.dot(point.offset).lt(zero);
-        let of_center = point.normal.dot(self.center.minus(point.offset));
+        let of_inside = point.normal.dot(self.inside.minus(point.offset));
         let below = point.normal.dot(point.offset);
-        let height = F::select(of_center.lt(zero), zero - below, below) * self.per_radius;
+        let height = F::select(of_inside.lt(zero), zero - below, below) * self.per_radius;
         let weight = F::select(lanes & is_other_side, point.weight(), zero);
         self.weight = self.weight + in_steps(weight);
         self.height = self.height + in_steps(weight * height);
@@ -276,7 +283,7 @@ impl<L: Lanes> OverhangSums<L> {
         };
         OverhangSums {
             normal: first(self.normal),
-            center: first(self.center),
+            inside: first(self.inside),
             per_radius: self.per_radius.store()[0],
             weight: sum(self.weight),
             height: sum(self.height),

@@ -73,8 +73,11 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
         let mut normal = toward(of_disc);
         let mut distance = hit.distance;
         let mut last_step = 0.0;
+        let mut inside = ray.at(distance);
         for fit in 1..=MAX_FITS {
             let sums = fit_one::<L>(points, ray.at(distance), normal, radius);
+            let Vec3Lanes { x, y, z } = sums.mean_offset();
+            inside = ray.at(distance) + Vec3::new(x, y, z);
             let sphere = sums.intersect(Vec3Lanes::splat(ray.direction));
             let step = damped(sphere.step, last_step);
             last_step = step;
@@ -97,16 +100,21 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
             && distance <= ray.t_max
             && (cloud.edge_test == EdgeTest::Off
                 || is_within_edge::<L>(self.cloud, position, candidate)
-                    && !sticks_out::<L>(points, position, hit.slot, normal))
+                    && !sticks_out::<L>(points, &candidate, position, inside - position))
     }
 }
 
-/// True if a hit on the disc in a slot sticks out beyond an edge.
+/// True if a hit sticks out beyond an edge; `inside` is the mean of the points of its fit relative to it.
 #[inline(always)]
-fn sticks_out<L: Lanes>(points: &FlatPoints, position: Vec3, slot: Slot, normal: Vec3) -> bool {
-    let radius = points.radius(slot);
-    let center = Vec3Lanes::splat(points.center(slot) - position);
-    let sums = OverhangSums::<L>::new(Vec3Lanes::splat(normal), center, L::splat(radius));
+fn sticks_out<L: Lanes>(
+    points: &FlatPoints,
+    hit: &CandidateHit,
+    position: Vec3,
+    inside: Vec3,
+) -> bool {
+    let CandidateHit { normal, radius, .. } = *hit;
+    let [normal, inside] = [normal, inside].map(Vec3Lanes::splat);
+    let sums = OverhangSums::<L>::new(normal, inside, L::splat(radius));
     sum_up::<L, _>(points, position, radius, sums).reduce_lanes().sticks_out()
 }
 

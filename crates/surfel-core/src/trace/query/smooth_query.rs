@@ -110,8 +110,8 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
             left &= !group;
             let region = candidates.region_along_rays(group, FIT_REACH, MAX_DISTANCE_FROM_DISC);
             collect_blocks::<L>(&cloud.points, &region, blocks);
-            let found = approach(blocks, rays, &candidates, group, &mut hits);
-            finish::<L, HAS_COLORS>(cloud, blocks, rays, &candidates, slots, found, &mut hits);
+            let (found, inside) = approach(blocks, rays, &candidates, group, &mut hits);
+            finish::<L, HAS_COLORS>(cloud, blocks, rays, &candidates, &inside, found, &mut hits);
         }
         hits
     }
@@ -142,7 +142,8 @@ fn candidates<W: PacketLanes>(
     (candidates, W::splat(0.0).lt(normal.dot(direction)))
 }
 
-/// Moves hits of a group along their rays to the surface, and returns the lanes that reach it.
+/// Moves hits of a group along their rays to the surface, and returns the lanes that reach it and the means of the points
+/// of their last fits.
 #[inline(always)]
 fn approach<W: PacketLanes>(
     blocks: &[StoredBlock],
@@ -150,12 +151,13 @@ fn approach<W: PacketLanes>(
     candidates: &PacketCandidates<W>,
     group: u32,
     hits: &mut SmoothHits<W>,
-) -> u32 {
+) -> (u32, Vec3Lanes<W>) {
     let PacketCandidates { direction, radius, .. } = *candidates;
     let start = hits.distances;
     let (mut open, mut found) = (group, 0);
     let mut position = candidates.position;
     let mut last_step = W::splat(0.0);
+    let mut inside = position;
     for fit in 1..=MAX_FITS {
         let lanes = lane_mask::<W>(open);
         let mut sums = SphereSums::new(hits.normals, radius);
@@ -176,6 +178,7 @@ fn approach<W: PacketLanes>(
         let distance = hits.distances + step;
         let is_near = (distance - start).abs().le(W::splat(MAX_DISTANCE_FROM_DISC) * radius);
         let moved = lanes & sphere.is_hit & is_near;
+        inside = Vec3Lanes::select(moved, position.plus(sums.mean_offset()), inside);
         hits.distances = W::select(moved, distance, hits.distances);
         hits.normals = Vec3Lanes::select(moved, facing(sphere.normal, direction), hits.normals);
         position = rays.origin().plus(direction.scaled(hits.distances));
@@ -188,7 +191,7 @@ fn approach<W: PacketLanes>(
         }
     }
     let in_range = rays.t_min.le(hits.distances) & hits.distances.le(rays.t_max);
-    found & in_range.bits()
+    (found & in_range.bits(), inside)
 }
 
 /// Adds the hits in `lanes` that the points enclose, with their nearest points and colours.
@@ -198,7 +201,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     blocks: &[StoredBlock],
     rays: &PacketRays<L::PacketLanes>,
     candidates: &PacketCandidates<L::PacketLanes>,
-    hit_slots: &[Slot; PACKET_WIDTH],
+    inside: &Vec3Lanes<L::PacketLanes>,
     lanes: u32,
     hits: &mut SmoothHits<L::PacketLanes>,
 ) {
@@ -211,8 +214,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     // A fitted sphere has no rim that sticks out beyond a bend and shows its back.
     let candidates = CandidateHitLanes::new(hits.normals, direction, radius);
     let mut neighborhood = NeighborhoodStats::<_, false>::new(candidates);
-    let center = centers_of(&cloud.points, hit_slots, lanes).minus(position);
-    let mut overhang = OverhangSums::new(hits.normals, center, radius);
+    let mut overhang = OverhangSums::new(hits.normals, inside.minus(position), radius);
     let mut colors = ColorSums::default();
     let mut nearest =
         NearestHits { distances: L::PacketLanes::splat(f32::INFINITY), slots: hits.slots };
@@ -262,21 +264,6 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
         let mean = colors.mean(colors_of(&cloud.points, &slots, accepted));
         hits.colors = Vec3Lanes::select(mask, mean, hits.colors);
     }
-}
-
-/// Returns the centers of the discs in these lanes, and zero in all others.
-#[inline(always)]
-fn centers_of<W: PacketLanes>(
-    points: &FlatPoints,
-    slots: &[Slot; PACKET_WIDTH],
-    lanes: u32,
-) -> Vec3Lanes<W> {
-    let mut centers = [[0.0; PACKET_WIDTH]; 3];
-    for lane in set_bits::<PACKET_WIDTH>(lanes) {
-        let center = points.center(slots[lane]);
-        [centers[0][lane], centers[1][lane], centers[2][lane]] = center.to_array();
-    }
-    Vec3Lanes::load_packet(&centers)
 }
 
 /// Returns the colours of the discs in these lanes, and zero in all others.

@@ -36,8 +36,8 @@ struct SphereHit {
 // Sums that tell whether a hit lies on the part of a surface that sticks out beyond a convex edge.
 struct OverhangSums {
     normal: vec3<f32>,
-    // Centre of the disc that was hit, relative to the hit.
-    center: vec3<f32>,
+    // Mean of the points on the side of the edge that was hit, relative to the hit.
+    inside: vec3<f32>,
     per_radius: f32,
     weight: f32,
     height: f32,
@@ -164,8 +164,13 @@ fn intersect_fit(sums: SphereSums, direction: vec3<f32>) -> SphereHit {
     return SphereHit(MIN_GRADIENT < length, step / sums.per_radius, normal / max(length, MIN_GRADIENT));
 }
 
-fn no_overhang(normal: vec3<f32>, center: vec3<f32>, radius: f32) -> OverhangSums {
-    return OverhangSums(normal, center, 1.0 / radius, 0.0, 0.0);
+// Returns the weighted mean of the points relative to the position.
+fn mean_offset(sums: SphereSums) -> vec3<f32> {
+    return sums.offset * (1.0 / (max(sums.weight, 1.0) * sums.per_radius));
+}
+
+fn no_overhang(normal: vec3<f32>, inside: vec3<f32>, radius: f32) -> OverhangSums {
+    return OverhangSums(normal, inside, 1.0 / radius, 0.0, 0.0);
 }
 
 // Adds a point within reach. It counts if it is on the other side of an edge: its normal is far from that of the hit,
@@ -176,9 +181,9 @@ fn add_overhang_point(sums: ptr<function, OverhangSums>, point: FitPoint) {
     if !is_other_side {
         return;
     }
-    let of_center = dot(point.normal, (*sums).center - point.offset);
+    let of_inside = dot(point.normal, (*sums).inside - point.offset);
     let below = dot(point.normal, point.offset);
-    let height = select(below, -below, of_center < 0.0) * (*sums).per_radius;
+    let height = select(below, -below, of_inside < 0.0) * (*sums).per_radius;
     let weight = point_weight(point);
     (*sums).weight += in_steps(weight);
     (*sums).height += in_steps(weight * height);

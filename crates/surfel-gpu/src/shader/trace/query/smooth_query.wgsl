@@ -92,8 +92,11 @@ fn find_surface(ray: Ray, disc_distance: f32, disc: Surfel) -> SmoothHit {
     var normal = facing(disc.normal, ray.direction);
     var distance = disc_distance;
     var last_step = 0.0;
+    var inside = ray_at(ray, distance);
     for (var fit = 1u; fit <= MAX_FITS; fit++) {
-        let sphere = intersect_fit(fit_sums(ray_at(ray, distance), normal, disc.radius), ray.direction);
+        let sums = fit_sums(ray_at(ray, distance), normal, disc.radius);
+        let sphere = intersect_fit(sums, ray.direction);
+        inside = ray_at(ray, distance) + mean_offset(sums);
         let step = damped(sphere.step, last_step);
         last_step = step;
         let moved = distance + step;
@@ -110,21 +113,22 @@ fn find_surface(ray: Ray, disc_distance: f32, disc: Surfel) -> SmoothHit {
         }
     }
     let is_in_range = ray.t_min <= distance && distance <= ray.t_max;
-    if !is_in_range || !is_accepted(ray, distance, normal, disc) {
+    if !is_in_range || !is_accepted(ray, distance, normal, inside, disc) {
         return missed;
     }
     return SmoothHit(true, distance, normal);
 }
 
-// Returns true if the points enclose a hit, and finds its nearest point and its colour.
-fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool {
+// Returns true if the points enclose a hit, and finds its nearest point and its colour. `inside` is the mean of the points
+// of the last fit.
+fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, inside: vec3<f32>, disc: Surfel) -> bool {
     if !HAS_COLORS && visits[visit_idx].has_edge_test == 0u {
         return true;
     }
     let position = ray_at(ray, distance);
     let hit = CandidateHit(position, normal, ray.direction, disc.radius);
     var stats = no_neighbors(hit);
-    var overhang = no_overhang(normal, disc.center - position, disc.radius);
+    var overhang = no_overhang(normal, inside - position, disc.radius);
     var color = HitColor(ColorSums(0.0, vec3<f32>(0.0)), NO_LIMIT, nearest_slot);
     list_points(position, disc.radius);
     loop {
