@@ -116,8 +116,13 @@ impl PyCloud {
             Some(crs) => Some(coordinate_system(crs)?),
             None => columns.get_item("crs")?.map(|crs| crs.extract()).transpose()?,
         };
-        let cloud = cloud_of(py, &columns, &all)?;
-        Ok(Self::new(cloud, SaveOptions { coordinate_system, ..SaveOptions::default() }))
+        let mut cloud = cloud_of(py, &columns, &all)?;
+        let mut options = SaveOptions::default();
+        if let Ok(source) = points.cast::<Self>() {
+            cloud.stations.clone_from(&source.get().cloud.stations);
+            options = source.get().options.clone();
+        }
+        Ok(Self::new(cloud, SaveOptions { coordinate_system, ..options }))
     }
 
     fn __len__(&self) -> usize {
@@ -219,6 +224,23 @@ impl PyCloud {
             all.set_item(&scalar.name, values?)?;
         }
         Ok(all)
+    }
+
+    /// The places of the scanners of its scans, which the column `station` counts from 0: dictionaries of `name`, `position`
+    /// (three world coordinates, or `None`), `rotation` (the quaternion x, y, z, w from the scanner's axes to those of the
+    /// world), and `rows` and `columns` of the scan's grid, or `None`.
+    #[getter]
+    fn stations<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let stations = self.cloud.stations.iter().map(|station| {
+            let described = PyDict::new(py);
+            described.set_item("name", &station.name)?;
+            described.set_item("position", station.position.map(DVec3::to_array))?;
+            described.set_item("rotation", station.rotation.to_array())?;
+            described.set_item("rows", station.grid.map(|[rows, _]| rows))?;
+            described.set_item("columns", station.grid.map(|[_, columns]| columns))?;
+            Ok(described)
+        });
+        stations.collect()
     }
 
     /// Writes the cloud with all its columns, in the format of the extension. The file is replaced once it is complete.

@@ -373,6 +373,19 @@ def test_clouds_of_clouds_keep_all_columns(points):
     assert list(again.scalars) == ["age", "height"] and again.normals is None
 
 
+def test_clouds_of_clouds_keep_stations(tmp_path):
+    header = "1\n{}\n10 20 2\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 2 1\n"
+    cells = [f"{x} {y} 0 0.5" for x, y in ((1, 0), (2, 0), (0, 3))]
+    (tmp_path / "scan.ptx").write_text("\n".join([header.format(len(cells)) + cells[0], *cells[1:], ""]))
+    cloud = surfel.read_cloud(tmp_path / "scan.ptx")
+    (station,) = cloud.stations
+    assert station["name"] == "scan 1" and station["position"] == [10, 20, 2]
+    assert (station["rows"], station["columns"]) == (3, 1)
+    assert numpy.allclose(numpy.abs(station["rotation"]), [0, 0, 0.5**0.5, 0.5**0.5])
+    assert surfel.Cloud(cloud, intensity=None).stations == cloud.stations
+    assert surfel.Cloud(cloud.points).stations == []
+
+
 def test_the_nearest_keyword_is_named(points):
     with pytest.raises(TypeError, match="unexpected keyword argument 'color'; the nearest known one is `colors`"):
         surfel.Cloud(points, color=points)
