@@ -16,6 +16,9 @@ use crate::scene::CloudGeometry;
 use crate::scene::color::SupportColors;
 use crate::surface::{EdgeTest, MIN_SLIT_DEPTH, SurfaceKind, SurfaceOptions, edge_retest_factor};
 
+/// Number of discs over each other, on average, beyond which they are crowded. Usual are 2 to 5.
+const MAX_OVERLAP: f32 = 50.0;
+
 /// A point cloud with the surface that its points describe.
 #[derive(Clone, Debug, Default)]
 pub struct FlatCloud {
@@ -39,6 +42,8 @@ pub struct FlatCloud {
     pub edge_test: EdgeTest,
     /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose.
     pub edge_retest_factor: f32,
+    /// True if rays meet so many discs that none may be tested in vain: then the nearest ones alone decide about shadows.
+    pub is_crowded: bool,
     /// True if normals point out of the body that the points enclose.
     pub has_outward_normals: bool,
     /// True if normals point to the side from which the surface was seen.
@@ -114,6 +119,7 @@ impl FlatCloud {
         let points = FlatPoints::new(surface_columns, progress)?;
         let mut flat = Self {
             edge_retest_factor: edge_retest_factor(points.evenness()),
+            is_crowded: MAX_OVERLAP < points.overlap(),
             points,
             lines,
             scatter,
@@ -161,6 +167,7 @@ impl FlatCloud {
         self.set_max_blend_distance();
         if !needs_rebuild {
             self.edge_retest_factor = edge_retest_factor(self.points.evenness());
+            self.is_crowded = MAX_OVERLAP < self.points.overlap();
             self.build_field(geometry, progress)?;
         }
         needs_rebuild.then(|| Self::from_columns(columns, geometry, progress)).transpose()

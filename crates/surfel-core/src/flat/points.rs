@@ -7,7 +7,7 @@ use super::point_columns::{PointColumns, fits_precision};
 use crate::bvh::{self, BvhNode, BvhPrimitive, NO_PRIMITIVE};
 use crate::error::Result;
 use crate::image::decode_srgb8;
-use crate::math::{LANES, Vec3, median};
+use crate::math::{Aabb, LANES, Vec3, median};
 use crate::progress::Progress;
 use crate::surface::{SurfaceKind, Surfel};
 use rayon::prelude::*;
@@ -101,6 +101,25 @@ impl FlatPoints {
         let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
         let sample = self.blocks.iter().step_by(step);
         median(sample.filter_map(PointBlock::min_distance)).unwrap_or(f32::INFINITY)
+    }
+
+    /// Returns the number of discs over each other, about: their area as a fraction of that of a box around them, by a
+    /// sample of the blocks; 0 without points.
+    pub(super) fn overlap(&self) -> f32 {
+        const N_SAMPLES: usize = 1000;
+        let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
+        let sample = self.blocks.iter().step_by(step);
+        let bounds = Aabb::of_points(sample.clone().map(|block| block.position(0)));
+        let radii = sample.map(|block| f64::from(block.max_radius()));
+        let (count, sum, squares) = radii.fold((0.0, 0.0, 0.0), |(count, sum, squares), radius| {
+            (count + 1.0, sum + radius, squares + radius * radius)
+        });
+        if bounds.is_empty() {
+            return 0.0;
+        }
+        let size = bounds.size().as_dvec3() + 2.0 * sum / count;
+        let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+        (self.ids.len() as f64 * std::f64::consts::PI * squares / count / area) as f32
     }
 
     /// Returns the radius of the point at `slot`.

@@ -293,7 +293,7 @@ impl RecordLayout {
             for (axis, field) in fields.iter().enumerate() {
                 self.fill(field, records, normals, |normal, v| normal[axis] = v as f32);
             }
-            normals.iter_mut().for_each(|normal| *normal = unit(*normal));
+            normals.iter_mut().for_each(|normal| *normal = rounded_to_unit(*normal));
         }
         if let (Some(fields), Some(colors)) = (&self.color, &mut slices.colors) {
             for (channel, field) in fields.iter().enumerate() {
@@ -326,14 +326,13 @@ impl RecordLayout {
     }
 }
 
-/// Returns `normal` at unit length; one without a direction stays as it is.
-fn unit(normal: Vec3) -> Vec3 {
-    let length = normal.length();
+/// Returns a normal that has unit length but for rounding at unit length. Other lengths may be radii.
+fn rounded_to_unit(normal: Vec3) -> Vec3 {
+    /// Greatest error of a length that is rounding, as of normals with two decimals.
+    const MAX_ROUNDING: f32 = 0.01;
+    let error = (normal.length() - 1.0).abs();
     // Division would change the last bits of a vector that is normalized already.
-    if (length - 1.0).abs() < 1e-6 || !(0.0 < length && length < f32::INFINITY) {
-        return normal;
-    }
-    normal / length
+    if 1e-6 <= error && error < MAX_ROUNDING { normal / normal.length() } else { normal }
 }
 
 #[cfg(test)]

@@ -142,6 +142,9 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
 #[inline(always)]
 fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
     match cloud.surface {
+        SurfaceKind::Smooth if cloud.is_crowded => {
+            nearest_occlusions(rays, occluded, |hits| trace_smooth::<L>(cloud, rays, hits));
+        }
         SurfaceKind::Smooth => {
             any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
         }
@@ -158,15 +161,24 @@ fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut 
             occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
         }
         SurfaceKind::Cylinder | SurfaceKind::SplatFit if cloud.goes_through_holes() => {
-            let mut hits = vec![SurfaceHit::MISS; rays.len()];
-            splat_hits::<L>(cloud, rays, &mut hits);
-            occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.is_miss());
+            nearest_occlusions(rays, occluded, |hits| splat_hits::<L>(cloud, rays, hits));
+        }
+        kind if kind.uses_discs() && cloud.edge_test != EdgeTest::Off && cloud.is_crowded => {
+            nearest_occlusions(rays, occluded, |hits| splat_hits::<L>(cloud, rays, hits));
         }
         kind if kind.uses_discs() && cloud.edge_test != EdgeTest::Off => {
             any_accepted_hit::<L, Disc, _>(&cloud.points, rays, EdgeFilter(cloud), occluded);
         }
         _ => any_hits_kernel::<L>(cloud, rays, occluded),
     }
+}
+
+/// Marks the rays whose search for the nearest hit finds one.
+#[inline(always)]
+fn nearest_occlusions(rays: &[Ray], occluded: &mut [bool], trace: impl FnOnce(&mut [SurfaceHit])) {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    trace(&mut hits);
+    occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.is_miss());
 }
 
 /// Replaces hits by nearer ones on the spheres or capsules of `points`.
