@@ -15,8 +15,8 @@ use surfel::SceneDescription;
 use surfel::description::RunSettings;
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
-use surfel_core::scanner::ruin;
 use surfel_formats::SaveOptions;
+use surfel_scanner::ruin;
 
 /// Arguments of `surfel demo`.
 #[derive(clap::Args, Debug)]

@@ -7,8 +7,8 @@ use std::path::Path;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scanner::ruin::UTM_ORIGIN;
 use surfel_formats::SaveOptions;
+use surfel_scanner::ruin::UTM_ORIGIN;
 
 /// Positions on the site.
 const GLASS: DVec3 = DVec3::new(-6.4, -9.6, 1.62);
@@ -152,8 +152,8 @@ mod tests {
     use std::fs;
     use surfel::SceneDescription;
     use surfel_core::progress::NoProgress;
-    use surfel_core::scanner::ruin;
     use surfel_core::scene::Material;
+    use surfel_scanner::ruin;
 
     #[test]
     fn files_are_replaced_not_overwritten() {

@@ -24,7 +24,7 @@
 //! ```
 
 mod error;
-mod display;
+mod number_text;
 mod file;
 mod salvage;
 mod table;

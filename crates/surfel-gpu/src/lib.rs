@@ -52,7 +52,7 @@ mod transfer;
 mod upload;
 mod scene_records;
 mod search;
-mod words;
+mod scene_words;
 mod pixel_order;
 mod part_size;
 mod readback;

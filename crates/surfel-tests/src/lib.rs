@@ -10,6 +10,6 @@ pub mod ground_truth;
 pub mod shapes;
 pub mod sampling;
 pub mod deviation;
-pub mod lit;
+pub mod picture_difference;
 pub mod true_scene;
 pub mod scan_quality;

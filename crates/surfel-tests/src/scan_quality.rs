@@ -1,6 +1,6 @@
 //! Pictures of scans compared with the scenes that were scanned, by kind of object.
 
-use crate::lit::PictureError;
+use crate::picture_difference::PictureError;
 use crate::true_scene::{TruePixel, TrueScene};
 use surfel_core::image::{Aovs, Image};
 

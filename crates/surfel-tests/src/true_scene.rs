@@ -1,16 +1,18 @@
 //! The pictures of a scene of signed distance fields, by sphere tracing.
 
-use crate::lit::{ALBEDO, HEADLIGHT, SUN, grey_scene, sun_and_headlight, toward_sun};
+use crate::picture_difference::{
+    ALBEDO, HEADLIGHT, SUN, grey_scene, sun_and_headlight, toward_sun,
+};
 use rayon::prelude::*;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Ray, Vec3};
 use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, Renderer, Settings};
-use surfel_core::scanner::scenes::{NamedScene, SceneView};
-use surfel_core::scanner::{DRay, Instrument};
 use surfel_core::scene::{Camera, Geometry, Projection};
 use surfel_core::trace::Simd;
+use surfel_scanner::scenes::{NamedScene, SceneView};
+use surfel_scanner::{DRay, Instrument};
 
 /// The surface that one pixel of a scene shows, and whether an instrument measured it.
 #[derive(Clone, Copy, Debug)]

@@ -61,7 +61,7 @@ test('angles, circles and lines have known sizes', () => {
 
 test('measurements become GeoJSON in the coordinates of the file', () => {
   const points = [[east, north, 1], [east + 4, north, 1], [east + 4, north + 3, 1]];
-  const info = { up, unit: 'm', coordinate_system: 'EPSG:32633+5783' };
+  const info = { up, unit: 'm', epsg: 32633 };
   const { crs, features } = geoJson([{ kind: 'area', name: 'roof', points }, { kind: 'polyline', name: 'eaves', points }], info);
   assert.equal(crs.properties.name, 'urn:ogc:def:crs:EPSG::32633');
   assert.deepEqual(features[0].geometry, { type: 'Polygon', coordinates: [[...points, points[0]]] });

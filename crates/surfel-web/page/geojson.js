@@ -3,7 +3,7 @@
 import { resultsOf } from './measure.js';
 
 /** A feature collection of measurements. */
-export function geoJson(measurements, { up, coordinate_system: system, unit }) {
+export function geoJson(measurements, { up, epsg, unit }) {
   const features = measurements.map((figure) => {
     const results = resultsOf(figure, up).map(({ name, value }) => [name.toLowerCase().replaceAll(' ', '_'), value]);
     return {
@@ -12,7 +12,6 @@ export function geoJson(measurements, { up, coordinate_system: system, unit }) {
       geometry: geometryOf(figure),
     };
   });
-  const epsg = /^EPSG:(\d+)/.exec(system ?? '')?.[1];
   const crs = epsg ? { crs: { type: 'name', properties: { name: `urn:ogc:def:crs:EPSG::${epsg}` } } } : {};
   return { type: 'FeatureCollection', ...crs, features };
 }

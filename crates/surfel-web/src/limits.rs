@@ -79,7 +79,7 @@ impl Default for Limits {
             max_pages: 32,
             max_connections: 192,
             max_pending_connections: 64,
-            max_view_pixels: 1 << 21,
+            max_view_pixels: 1 << 23,
             max_save_pixels: 1 << 26,
             max_rays: 1 << 34,
             max_movie_pixels: 1 << 32,

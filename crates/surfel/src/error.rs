@@ -1,7 +1,7 @@
 //! Errors between a description and a picture.
 
 use crate::description::{Invalid, with_nearest};
-use crate::names::list_files;
+use crate::file_names::list_files;
 use std::path::PathBuf;
 
 /// An error of this crate. Its message names the file, the place in it, what was found and what was expected.

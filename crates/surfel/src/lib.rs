@@ -56,7 +56,7 @@
 //!
 //! The renderer itself is the crate [`surfel_core`], the readers and writers are [`surfel_formats`].
 
-pub mod names;
+pub mod file_names;
 pub mod crs;
 pub mod memory_files;
 pub mod description;

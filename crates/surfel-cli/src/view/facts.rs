@@ -3,9 +3,9 @@
 use super::legend::hex;
 use serde_json::{Value, json};
 use surfel::SceneDescription;
-use surfel::crs::Unit;
+use surfel::crs::{Unit, short_name};
 use surfel::description::{CameraSettings, write_table};
-use surfel::resolve::{LoadedScene, coordinate_system, located_stations};
+use surfel::resolve::{LoadedScene, coordinate_system, coordinate_system_text, located_stations};
 use surfel_core::image::{class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::points::{NOISE_CLASSES, PointCloud, PointFilter};
@@ -22,6 +22,16 @@ pub fn columns(cloud: &PointCloud) -> Vec<&str> {
     let others: Vec<&str> = scalars.filter(|name| !names.contains(name)).collect();
     names.extend(others);
     names
+}
+
+/// The name of the coordinate system, and its horizontal EPSG code.
+pub fn coordinate_system_facts(
+    scene: &LoadedScene,
+    startup: &SceneDescription,
+) -> (Option<String>, Option<u16>) {
+    let name = coordinate_system_text(scene, startup).map(|text| short_name(&text));
+    let codes = coordinate_system(scene, startup).and_then(|system| system.epsg());
+    (name, codes.map(|codes| codes.horizontal))
 }
 
 /// The symbol of the unit of lengths, if the coordinate system tells it.

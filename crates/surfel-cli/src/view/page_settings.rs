@@ -13,7 +13,7 @@ use surfel::description::{
     Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OrthographicHeight,
     OutputSettings, READ_ONCE, parse_table, write_table,
 };
-use surfel::names::file_name;
+use surfel::file_names::file_name;
 use surfel_web::{Error, Limits, SettingsMap};
 
 /// Target of a material for everything, where a page names a target.

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 use surfel::description::{MaterialChoice, ObjectOverride};
-use surfel::names::file_name;
+use surfel::file_names::file_name;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::scene::inlier_bounds;

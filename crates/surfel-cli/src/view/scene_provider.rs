@@ -3,7 +3,8 @@
 use super::added_files::{self, AddedFiles, PageFile};
 use super::camera_path::{camera_path, with_path, write_movie};
 use super::facts::{
-    classes, columns, filter_columns, has_returns, stations, surfaces, unit_symbol,
+    classes, columns, coordinate_system_facts, filter_columns, has_returns, stations, surfaces,
+    unit_symbol,
 };
 use super::file_names::{ClientProgress, ViewedFolders};
 use super::freed_memory;
@@ -25,9 +26,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
+use surfel::file_names::{file_name, list_files};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
-use surfel::names::{file_name, list_files};
 use surfel::overlay;
 use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
@@ -263,6 +264,7 @@ impl SceneProvider for FileSceneProvider {
         let loaded = self.scene.loaded();
         let points = loaded.sample_points();
         let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
+        let (coordinate_system, epsg) = coordinate_system_facts(loaded, &self.startup);
         json!({
             "name": name_of(&self.typed),
             "points": n_points,
@@ -283,7 +285,8 @@ impl SceneProvider for FileSceneProvider {
             "columns": filter_columns(loaded),
             "threads": self.scene.n_threads(),
             "simd": self.scene.simd().name(),
-            "coordinate_system": loaded.file_info().coordinate_system,
+            "coordinate_system": coordinate_system,
+            "epsg": epsg,
             "unit": unit_symbol(loaded, &self.startup),
         })
     }

@@ -8,8 +8,8 @@ use surfel_core::words::counted;
 use super::document::Document;
 use super::hierarchy::Hierarchy;
 use super::json::Json;
-use crate::display::format_vector;
 use crate::error::Result;
+use crate::number_text::format_vector;
 
 /// Reads the transform from a node's coordinates to its parent's.
 pub(super) fn read(node: &Json) -> Result<Transform> {

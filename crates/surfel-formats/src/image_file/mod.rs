@@ -4,7 +4,7 @@ mod georeference;
 mod options;
 mod exr;
 pub(crate) mod png;
-mod display;
+mod jpeg_webp;
 mod tiff;
 
 pub use self::georeference::{EpsgCodes, Georeference};
@@ -16,8 +16,8 @@ use std::path::Path;
 
 use surfel_core::image::Image;
 
-use self::display::DisplayFormat;
 use self::georeference::world_file_extension;
+use self::jpeg_webp::DisplayFormat;
 use crate::error::Result;
 use crate::file::{check_output_path, extension, save_text, unsupported_extension};
 
@@ -52,7 +52,7 @@ pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<
     check_image_output(path)?;
     let extension = extension(path);
     if let Some(format) = DisplayFormat::from_extension(&extension) {
-        display::write(path, image, options, format)?;
+        jpeg_webp::write(path, image, options, format)?;
         return write_world_file(path, &extension, options);
     }
     match extension.as_str() {

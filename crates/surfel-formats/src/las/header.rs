@@ -6,9 +6,9 @@ use laz::LazVlr;
 use surfel_core::math::DVec3;
 use surfel_core::words::counted;
 
-use crate::display::format_vector;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
+use crate::number_text::format_vector;
 
 /// The header of a file.
 pub(super) struct Header {

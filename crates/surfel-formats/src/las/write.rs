@@ -15,9 +15,9 @@ use surfel_core::progress::Progress;
 use super::laz::MAX_EXTRA_BYTES;
 use super::write_header::{MAX_EXTRA_COLUMNS, header_bytes};
 use super::write_plan::WritePlan;
-use crate::display::format_vector;
 use crate::error::{Error, Result};
 use crate::file::{extension, write_error, write_file};
+use crate::number_text::format_vector;
 use crate::options::SaveOptions;
 use crate::table::{POINTS_PER_CHUNK, encode_points};
 

@@ -3,7 +3,7 @@
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 
-use crate::display::{format_number, format_vector};
+use crate::number_text::{format_number, format_vector};
 use crate::options::FileInfo;
 
 /// Bounds and resolution of a cloud before it is merged, from which the precision lost by merging follows.

@@ -17,7 +17,7 @@ use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::{Deviation, TrueViews};
 use surfel_tests::ground_truth::GroundTruth;
-use surfel_tests::lit::LitViews;
+use surfel_tests::picture_difference::LitViews;
 use surfel_tests::sampling::{Sampling, mean_spacing};
 use surfel_tests::scenes;
 use surfel_tests::shapes;

@@ -3,9 +3,9 @@
 use surfel_core::math::{DVec3, Random, Vec3};
 use surfel_core::points::{PointCloud, PreparedCloud, prepare};
 use surfel_core::progress::NoProgress;
-use surfel_core::scanner::scenes::ruin;
 use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Projection, fit_camera};
 use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_scanner::scenes::ruin;
 use surfel_tests::clouds;
 use surfel_tests::ground_truth::GroundTruth;
 use surfel_tests::sampling::Sampling;

@@ -4,7 +4,7 @@ use surfel_core::points::{
     Orientation, POINT_SOURCE, Preparation, StructureChoice, Values, prepare,
 };
 use surfel_core::progress::NoProgress;
-use surfel_core::scanner::ruin;
+use surfel_scanner::ruin;
 
 /// Columns stand on a floor, and the floor on the ground, with sharp edges between them.
 #[test]

@@ -1,8 +1,8 @@
 //! Rules of colours: single ones, backgrounds, and what colours points.
 
 use super::Invalid;
-use super::nearest::nearest_if_any;
 use super::rule::{Rule, as_list, expected, from_core};
+use super::spelling::nearest_if_any;
 use csscolorparser::NAMED_COLORS;
 use serde_json::{Value, json};
 use std::path::Path;

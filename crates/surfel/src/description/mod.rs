@@ -17,7 +17,7 @@ mod lamp;
 mod light;
 mod material;
 mod named_view;
-mod nearest;
+mod spelling;
 mod object;
 mod object_override;
 mod object_settings;
@@ -43,7 +43,6 @@ pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
 pub use named_view::{NamedView, ViewSettings};
-pub use nearest::{misspelled, nearest, nearest_if_any, synonym, with_nearest};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{
@@ -54,6 +53,7 @@ pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSetting
 pub use plan::PlanSettings;
 pub use point_filter::Returns;
 pub use section::{Part, Section};
+pub use spelling::{misspelled, nearest, nearest_if_any, synonym, with_nearest};
 pub(crate) use table::write_parts;
 pub use table::write_table;
 

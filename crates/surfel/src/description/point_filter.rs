@@ -1,8 +1,8 @@
 //! Settings that choose points by their columns, and the filter that they make together.
 
 use super::Invalid;
-use super::nearest::nearest_if_any;
 use super::rule::{Rule, as_list, expected};
+use super::spelling::nearest_if_any;
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_core::image::{class_name, class_named};

@@ -3,7 +3,7 @@
 //! Text is also what a command line gives, so `"1,2,3"` and `[1, 2, 3]` are the same vector to every door.
 
 use super::Invalid;
-use super::nearest::nearest_if_any;
+use super::spelling::nearest_if_any;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf, absolute};
 use std::str::FromStr;

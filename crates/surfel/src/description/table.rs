@@ -2,8 +2,8 @@
 
 use super::invalid::Invalid;
 use super::keys::KeyedSettings;
-use super::nearest::{nearest, synonym};
 use super::section::Part;
+use super::spelling::{nearest, synonym};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -78,7 +78,7 @@ pub(super) fn key_advice(key: &str, known: &[impl AsRef<str>]) -> String {
     let synonym = synonym(&key).filter(|path| known.clone().any(|known| known == *path));
     let paths: Vec<&str> = match synonym {
         Some(path) => vec![path],
-        None => known.clone().filter(|path| last(path) == last(&key)).collect(),
+        None => known.clone().filter(|path| last(path) == last(&key) && *path != key).collect(),
     };
     let Some(first) = paths.first() else { return nearest(&key, known) };
     let outside = match key.split_once('.') {

@@ -20,11 +20,21 @@ pub fn coordinate_system(
     scene: &LoadedScene,
     description: &SceneDescription,
 ) -> Option<CoordinateSystem> {
-    let of_files = || CoordinateSystem::parse(&scene.file_info().coordinate_system?);
-    let stated = description.world.crs.as_deref().and_then(CoordinateSystem::parse);
-    match stated {
-        Some(degrees) if degrees.unit() == Unit::Degrees => of_files().or(Some(degrees)),
-        stated => stated.or_else(of_files),
+    CoordinateSystem::parse(&coordinate_system_text(scene, description)?)
+}
+
+/// Returns the coordinate system of a scene as the description or the files state it; one of the files may be unknown.
+pub fn coordinate_system_text(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+) -> Option<String> {
+    let of_files = scene.file_info().coordinate_system;
+    let stated = description.world.crs.clone();
+    let parse = |text: &Option<String>| text.as_deref().and_then(CoordinateSystem::parse);
+    match parse(&stated) {
+        Some(degrees) if degrees.unit() == Unit::Degrees && parse(&of_files).is_some() => of_files,
+        Some(_) => stated,
+        None => of_files,
     }
 }
 

@@ -228,7 +228,8 @@ fn automatic_azimuth_deg(context: &LightingContext) -> f64 {
         let north = Sun::direction_from_angles(0.0, 0.0, context.up).as_dvec3();
         let east = Sun::direction_from_angles(90.0, 0.0, context.up).as_dvec3();
         let ahead_deg = ahead.dot(east).atan2(ahead.dot(north)).to_degrees();
-        (ahead_deg + turn_deg).rem_euclid(360.0)
+        // Few digits for the command line that states it.
+        (100.0 * (ahead_deg + turn_deg).rem_euclid(360.0)).round() / 100.0
     };
     if forward.dot(context.up.as_dvec3()) < -0.8 {
         return azimuth_deg(camera_up, -45.0);

@@ -8,6 +8,7 @@
 use super::above_land::is_above_land;
 use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
 use super::junctions::join_to_surfaces;
+use super::neighborhood_stats::Typical;
 use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_surface};
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
@@ -16,7 +17,6 @@ use super::solids::{apply_structure, ball_radius, clamp_solids, second_distance}
 use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
-use super::typical::Typical;
 use super::vegetation::{is_vegetated, land_normal};
 use super::wall_faces::join_faces;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};

@@ -5,7 +5,7 @@
 
 pub mod point_shape;
 pub mod edge_planes;
-pub mod typical;
+pub mod neighborhood_stats;
 pub mod octants;
 pub mod plan_cells;
 pub mod elevation_grid;

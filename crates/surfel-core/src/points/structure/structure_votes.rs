@@ -1,7 +1,7 @@
 //! The votes of neighbours on structures: the region around a point decides whether it is scattered.
 
+use super::neighborhood_stats::SPARSE;
 use super::point_shape::{PointShape, Structure};
-use super::typical::SPARSE;
 use super::vegetation::{count_scattered, is_noisy, is_vegetated};
 use crate::error::Result;
 use crate::math::Vec3;

@@ -7,7 +7,7 @@ use crate::description::{
     ObjectDescription, ObjectMotion, ObjectSettings, PreparationSettings, SceneDescription,
 };
 use crate::error::{Error, Result};
-use crate::names::file_name;
+use crate::file_names::file_name;
 use crate::progress_log::ProgressLog;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -16,7 +16,7 @@ use super::environment::load_environment;
 use super::sequence::Sequence;
 use crate::description::{CameraMotion, Invalid, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
-use crate::names::list_files;
+use crate::file_names::list_files;
 use std::collections::BTreeMap;
 use std::iter::successors;
 use std::ops::Range;
