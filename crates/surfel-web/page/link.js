@@ -4,7 +4,7 @@ import { isMeasurement } from './measure.js';
 import { createPatch } from './merge-patch.js';
 
 /** The content of an address without a link. */
-export const NO_LINK = { patch: {}, measurements: [] };
+const NO_LINK = { patch: {}, measurements: [] };
 const PREFIX = '#view=';
 /** Keys of the window and the files, which are not part of a view. */
 const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output'];
@@ -26,7 +26,15 @@ export function encodeHash(patch, measurements = []) {
   return PREFIX + base64.replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
 }
 
-/** The `{ patch, measurements }` in the hash of an address; null if it has no valid patch. Invalid measurements are left out. */
+/** The content of an address; `report` is called with a text on what is left out of it because it is invalid. */
+export function readLink(hash, report) {
+  const link = decodeHash(hash);
+  if (!link && hash.startsWith(PREFIX)) report('The link is broken or incomplete: it has no effect.');
+  if (link?.n_invalid) report('The link has invalid measurements, which are left out.');
+  return link ?? NO_LINK;
+}
+
+/** The `{ patch, measurements, n_invalid }` in the hash of an address; null if it has no valid patch. Invalid measurements are counted and left out. */
 export function decodeHash(hash) {
   if (!hash.startsWith(PREFIX)) return null;
   const base64 = hash.slice(PREFIX.length).replaceAll('-', '+').replaceAll('_', '/');
@@ -34,8 +42,10 @@ export function decodeHash(hash) {
     const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
     const content = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
     if (typeof content !== 'object' || content === null || Array.isArray(content)) return null;
-    const { measurements, ...patch } = content;
-    return { patch, measurements: Array.isArray(measurements) ? measurements.filter(isMeasurement).map(withoutResults) : [] };
+    const { measurements = [], ...patch } = content;
+    const all = Array.isArray(measurements) ? measurements : [measurements];
+    const valid = all.filter(isMeasurement).map(withoutResults);
+    return { patch, measurements: valid, n_invalid: all.length - valid.length };
   } catch {
     return null;
   }

@@ -11,7 +11,7 @@ import { element } from './dom.js';
 import { histogramRows } from './histogram.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
-import { NO_LINK, decodeHash } from './link.js';
+import { readLink } from './link.js';
 import { MEASURE_TOOLS, MeasureTool } from './measure-tool.js';
 import { Navigation } from './navigation.js';
 import { objectSection } from './object-controls.js';
@@ -31,7 +31,7 @@ import { ViewHistory } from './view-history.js';
 import { viewRows } from './view-section.js';
 import { setUpVolumes } from './volume.js';
 
-const link = decodeHash(location.hash) ?? NO_LINK;
+const link = readLink(location.hash, showToast);
 const viewer = new Viewer(link.patch);
 const navigation = new Navigation(viewer);
 const panel = new Panel(viewer);
