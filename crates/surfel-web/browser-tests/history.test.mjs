@@ -80,11 +80,10 @@ test('the camera and measurements are undone and redone by keys', async () => {
 
 test('keys undo while a list, a slider or a switch has the focus, and not while a text is typed', async () => {
   const first = await color();
-  const legend = page.locator('#panel [data-key=legend]');
   const controls = [
     [colorField(), () => colorField().selectOption('elevation')],
     [page.locator('#panel [data-key="sun.azimuth"]'), () => page.keyboard.press('ArrowRight')],
-    [legend, () => page.keyboard.press('Space')],
+    [page.locator('#panel [data-key=clip_box]'), () => page.keyboard.press('Space')],
   ];
   for (const [control, action] of controls) {
     const before = await state(page, 'scene');

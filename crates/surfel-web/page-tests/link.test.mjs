@@ -50,6 +50,14 @@ test('links carry valid measurements', () => {
   assert.deepEqual(decodeHash(encodeHash({ measurements: 'text' })), { patch: {}, measurements: [], n_invalid: 1 });
 });
 
+test('links carry measurements unless they are those of the scene', () => {
+  const figure = { kind: 'annotation', name: 'ridge', points: [[1, 2, 3]] };
+  assert.equal(encodeHash({}, [figure], [figure]), '');
+  assert.equal(decodeHash(encodeHash({ color: 'rgb' }, [figure], [figure])).measurements, null);
+  assert.deepEqual(decodeHash(encodeHash({}, [], [figure])).measurements, []);
+  assert.deepEqual(viewPatch({ measurements: [figure] }, { color: 'rgb' }), { color: 'rgb' });
+});
+
 test('invalid hashes are ignored', () => {
   for (const hash of ['', '#', '#top', '#view=', '#view=!!!', '#view=YWJj', '#view=WzFd']) {
     assert.equal(decodeHash(hash), null, hash);
@@ -66,7 +74,7 @@ test('what is invalid in a link is reported', () => {
   for (const fine of ['', '#', '#top', hash]) assert.deepEqual(reports(fine), []);
   for (const broken of ['#view=', '#view=!!!', hash.slice(0, 26)]) assert.match(reports(broken)[0], /broken or incomplete/, broken);
   assert.match(reports(encodeHash({ measurements: [7] }))[0], /invalid measurements/);
-  assert.deepEqual(readLink('#view=!!!', () => {}), { patch: {}, measurements: [] });
+  assert.deepEqual(readLink('#view=!!!', () => {}), { patch: {}, measurements: null });
 });
 
 test('patches merge as RFC 7386 defines', () => {

@@ -39,7 +39,7 @@ export function setUpSceneLoading(viewer, measureTool, addFiles) {
     if (!viewer.isConnected) return;
     const { patch, measurements } = readLink(location.hash, showToast);
     viewer.showLink(patch);
-    measureTool.figures = measurements;
+    measureTool.figures = measurements ?? viewer.initialMeasurements;
   });
   const lost = sessionStorage.getItem(ADDED);
   if (lost) showToast(`${lost}: added to the page, and not kept when it is loaded again. Add it again.`);

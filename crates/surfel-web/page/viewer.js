@@ -38,6 +38,8 @@ export class Viewer {
   changedByUser = signal();
   /** Emits before scene and camera are replaced by those of a link, an earlier state, a scene file or other data. */
   viewReplaced = signal();
+  /** Emits the measurements of a scene file that the user has chosen. */
+  measurementsLoaded = signal();
   cameraChanged = signal();
   frameShown = signal();
   toolChanged = signal();
@@ -90,6 +92,11 @@ export class Viewer {
   /** The added files that are shown. */
   get addedObjects() {
     return (this.scene?.added_files ?? []).map((id) => this.addedFiles.get(id)).filter(Boolean);
+  }
+
+  /** The measurements of the scene as the server was started with. */
+  get initialMeasurements() {
+    return this.initialScene.measurements ?? [];
   }
 
   /** All files and objects. */
@@ -245,6 +252,7 @@ export class Viewer {
     // Those that were cancelled meanwhile are answered already.
     for (const message of this.#waitingRequests.splice(0).filter(({ id }) => this.#requests.has(id))) {
       if (!isReady && VIEW_REQUESTS.includes(message.type)) this.#waitingRequests.push(message);
+      else if (this.#maxMessageBytes < byteLength(message)) this.#rejectRequest(message.id, 'the request is too long for the server');
       else if (!this.#connection.send(message)) this.#rejectRequest(message.id, 'there is no connection');
     }
   }
@@ -363,6 +371,7 @@ export class Viewer {
 
   #receiveScene({ number, id, seq, scene, camera, legend }) {
     this.legend = legend;
+    const { measurements } = this.#confirmedScene;
     this.#confirmedScene = scene;
     this.#sceneNumber = number;
     this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
@@ -377,6 +386,7 @@ export class Viewer {
     if (id !== undefined) {
       // The user has chosen a scene file, and can undo it.
       if (id === this.#loadId) this.#loadId = null;
+      if (!areEqual(measurements, scene.measurements)) this.measurementsLoaded(scene.measurements ?? []);
       this.changedByUser();
     }
     this.sceneChanged();
