@@ -37,8 +37,8 @@ use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Graph, Material};
 use surfel_web::{
-    AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PointLocator, PreparedScene,
-    Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
+    AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PointLocator,
+    PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
 /// The scenes of one set of files.
@@ -208,7 +208,6 @@ impl FileSceneProvider {
         names.extend(ColorSource::names_where(ColorSource::is_computed));
         names
     }
-
 }
 
 /// Describes the points of a view at a time.
