@@ -51,6 +51,25 @@ test('a page reconnects and keeps its view', async () => {
   assert.notEqual(await finishedPixels(page), screen);
 });
 
+test('a link of a megabyte and a broken link open the initial view, with the reason', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  for (const [hash, reason] of [
+    [encodeHash({ caption: 'x'.repeat(750_000) }), /too long/], [encodeHash({ color: 'elevation' }).slice(0, -3), /broken or incomplete/],
+  ]) {
+    const page = await blankPage();
+    open.push(page);
+    await page.goto(server.link + hash);
+    await page.locator('.toast', { hasText: reason }).waitFor();
+    await settled(page);
+    assert.equal((await state(page, 'scene')).caption, undefined);
+    await show(page, {});
+    await page.evaluate((to) => { location.hash = to; }, encodeHash({ caption: 'y'.repeat(300_000) }));
+    await page.locator('.toast', { hasText: 'too long' }).waitFor();
+    await settled(page);
+    assert.ok(await page.locator('#banner').isHidden());
+  }
+});
+
 test('a page without changes shows the same picture after reconnecting', async () => {
   const server = await serve(['town.ply'], ...QUICK);
   const page = await openTracked(server.link);

@@ -78,6 +78,51 @@ test('the camera and measurements are undone and redone by keys', async () => {
   assert.deepEqual(await measurements(), ['distance 1']);
 });
 
+test('keys undo while a list, a slider or a switch has the focus, and not while a text is typed', async () => {
+  const first = await color();
+  const controls = [
+    [colorField(), () => colorField().selectOption('elevation')],
+    [page.locator('#panel [data-key="sun.azimuth"]'), () => page.keyboard.press('ArrowRight')],
+    [page.locator('#panel [data-key=clip_box]'), () => page.keyboard.press('Space')],
+  ];
+  for (const [control, action] of controls) {
+    const before = await state(page, 'scene');
+    await control.focus();
+    await change(action);
+    await change(() => page.keyboard.press('Control+z'));
+    assert.deepEqual(await state(page, 'scene'), before);
+  }
+  await change(() => colorField().selectOption('elevation'));
+  const caption = page.locator('#panel [data-key=caption]');
+  await caption.focus();
+  await page.keyboard.type('roofs');
+  await page.keyboard.press('Control+z');
+  assert.equal(await caption.inputValue(), '');
+  assert.equal(await color(), 'elevation');
+  await caption.blur();
+  await change(() => undo().click());
+  assert.equal(await color(), first);
+});
+
+test('undo ends a transition and the turntable', async () => {
+  await page.emulateMedia({ reducedMotion: 'no-preference' });
+  await page.locator('#viewport').focus();
+  await page.keyboard.press('3');
+  await page.waitForTimeout(120);
+  await page.keyboard.press('Control+z');
+  await settled(page);
+  assert.deepEqual(await state(page, 'camera'), opening);
+  assert.ok(!await redo().isDisabled());
+  const turn = page.locator('[data-action=turntable]');
+  await turn.click();
+  await page.waitForFunction((y) => window.surfel.state.camera.position[1] !== y, opening.position[1]);
+  await undo().click();
+  await settled(page);
+  assert.deepEqual(await state(page, 'camera'), opening);
+  assert.equal(await turn.textContent(), 'Turn');
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+});
+
 test('a reload keeps camera, settings and measurements', async () => {
   await change(async () => drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.6)));
   await change(() => colorField().selectOption('elevation'));

@@ -307,6 +307,6 @@ test('one tool of the toolbar is reached by Tab, the others by arrows', async ()
   for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowUp');
   assert.equal(await label(), 'View at the start');
   await page.keyboard.press('ArrowUp');
-  assert.equal(await label(), 'Height profile');
+  assert.equal(await label(), 'Annotate a point');
   assert.deepEqual(await state(page, 'camera'), opening);
 });

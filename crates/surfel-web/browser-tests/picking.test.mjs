@@ -1,13 +1,15 @@
 // Picking and measuring: the page shows the attributes that are in the file.
 
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, beforeEach, test } from 'node:test';
 import { project } from '../page/camera.js';
-import { encodeHash } from '../page/link.js';
-import { angleDegrees, circleThrough, pathLength } from '../page/measure.js';
+import { pathLength } from '../page/figures.js';
+import { decodeHash, encodeHash } from '../page/link.js';
+import { angleDegrees, circleThrough } from '../page/measure.js';
 import { RESOLUTION } from './data.mjs';
-import { closePage, copyBy, data, openPage, pixelAt, QUICK, reopen, serve, settled, show, state } from './harness.mjs';
+import { closePage, copyBy, data, openPage, pixelAt, QUICK, reopen, serve, settled, shell, show, state } from './harness.mjs';
 
 const AXES = ['x', 'y', 'z'];
 let page;
@@ -217,7 +219,7 @@ test('labels are hidden behind what hides their points', async () => {
   const shown = async (n, figures, patch = {}) => {
     await page.evaluate((hash) => { location.hash = hash; }, encodeHash(patch, figures));
     await page.waitForFunction((count) => document.querySelectorAll('#overlay .label').length === count, n);
-    return Number(await page.locator('#overlay .label').first().textContent());
+    return Number(await page.locator('#overlay .label').first().locator('text').last().textContent());
   };
   const figures = [figure('polyline 1', seen), figure('polyline 2', [buried[0], buried[1], buried[0]])];
   isClose(await shown(1, figures), pathLength(seen));
@@ -225,6 +227,78 @@ test('labels are hidden behind what hides their points', async () => {
   const { position, focal_point } = await state(page, 'camera');
   const camera = { position: [position[0], position[1], 2 * focal_point[2] - position[2]], focal_point, view_up: [0, 0, 1] };
   await shown(2, figures, { camera });
+});
+
+test('a text is pinned to a point, is hidden behind what hides it, and undone', async () => {
+  const pixel = await pixelAt(page, 0.6, 0.75);
+  const [point] = (await pointsAt([pixel])).map(positionOf);
+  await measure('annotation', [pixel]);
+  const field = page.getByLabel('Text of the annotation');
+  await page.waitForFunction(() => document.activeElement.ariaLabel === 'Text of the annotation');
+  const recorded = (name) => page.waitForURL((url) => decodeHash(url.hash)?.measurements?.[0]?.name === name);
+  await recorded('annotation 1');
+  await page.keyboard.type('loose tiles');
+  await page.keyboard.press('Enter');
+  const label = page.locator('#overlay .label');
+  await label.filter({ hasText: 'loose tiles' }).waitFor();
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'viewport');
+  await recorded('loose tiles');
+  const { measurements } = decodeHash(new URL(page.url()).hash);
+  assert.deepEqual(measurements, [{ kind: 'annotation', name: 'loose tiles', points: [point] }]);
+  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[aria-label="Download as GeoJSON"]').click()]);
+  const { features: [feature] } = JSON.parse(readFileSync(await file.path(), 'utf8'));
+  assert.deepEqual([feature.properties.name, feature.geometry], ['loose tiles', { type: 'Point', coordinates: point }]);
+  await field.fill('');
+  await field.press('Enter');
+  assert.equal(await field.inputValue(), 'loose tiles');
+  await page.keyboard.press('Control+z');
+  await label.filter({ hasText: 'annotation 1' }).waitFor();
+  const [x, y, z] = point;
+  const buried = { kind: 'annotation', name: 'below', points: [[x, y, z - 1]] };
+  await page.evaluate((hash) => { location.hash = hash; }, encodeHash({}, [buried]));
+  await label.filter({ hasText: 'annotation 1' }).waitFor({ state: 'detached' });
+  await page.locator('#overlay .measure-dot').waitFor({ state: 'detached' });
+  assert.equal(await field.inputValue(), 'below');
+});
+
+test('scene files carry measurements: the viewer shows them again, and the command line renders them', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.4)];
+  const corners = (await pointsAt(pixels)).map(positionOf);
+  await measure('distance', pixels);
+  await page.locator('.measurement').waitFor();
+  await page.locator('[data-action="export"]').click();
+  await page.waitForFunction(() => document.getElementById('export-text').value.startsWith('surfel'));
+  const text = page.locator('#export-text');
+  assert.ok(!(await text.inputValue()).includes('measurements'));
+  const files = {};
+  for (const format of ['toml', 'json']) {
+    await page.locator(`[data-format="${format}"]`).click();
+    files[format] = await text.inputValue();
+  }
+  await page.locator('#export-close').click();
+  const figure = { kind: 'distance', name: 'distance 1', points: corners };
+  assert.deepEqual(JSON.parse(files.json).measurements, [figure]);
+  writeFileSync(join(data.folder, 'measured.toml'), files.toml);
+  shell('surfel render measured.toml --resolution 64x48 --spp 1 -o measured.png');
+  const other = await openPage((await serve(['measured.toml'], ...QUICK)).link);
+  const name = other.locator('.measurement h3');
+  assert.deepEqual(await name.allTextContents(), ['distance 1']);
+  assert.equal(decodeHash(new URL(other.url()).hash)?.measurements ?? null, null);
+  // A link tells that they were deleted.
+  await other.locator('[aria-label="Delete distance 1"]').click();
+  await other.waitForFunction(() => location.hash !== '');
+  await other.reload();
+  await settled(other);
+  assert.equal(await name.count(), 0);
+  await reopen(other);
+  assert.equal(await name.count(), 1);
+  await closePage(other);
+  await reopen(page);
+  await page.locator('#scene-file').setInputFiles({ name: 'measured.json', mimeType: 'text/plain', buffer: Buffer.from(files.json) });
+  await page.locator('.measurement h3', { hasText: 'distance 1' }).waitFor();
+  await page.waitForFunction(() => !document.querySelector('[data-action="undo"]').disabled);
+  await page.locator('[data-action="undo"]').click();
+  await page.locator('.measurement').waitFor({ state: 'detached' });
 });
 
 test('a volume over the roof agrees with its points, above each base', async () => {
@@ -323,7 +397,8 @@ test('a height profile shows the points of the file beside its line', async () =
   const [file] = await Promise.all([page.waitForEvent('download'), card.getByText('CSV').click()]);
   const rows = readFileSync(await file.path(), 'utf8').trim().split('\n').slice(1).map((row) => row.split(',').map(Number));
   assert.ok(100 < least.length && least.length <= rows.length && rows.length <= most.length);
-  const isKnown = (row) => most.some((point) => point.every((value, axis) => Math.abs(value - row[3 + axis]) < RESOLUTION / 2));
+  // Heights and coordinates are those of the file, digit by digit.
+  const isKnown = (row) => most.some((point) => point[2] === row[2] && point.every((value, axis) => value === row[3 + axis]));
   assert.deepEqual(rows.filter((row) => !isKnown(row)), []);
   await page.locator('[aria-label="Delete profile 1"]').click();
   assert.ok(await card.isHidden());

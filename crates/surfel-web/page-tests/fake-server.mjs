@@ -54,8 +54,8 @@ export const CAMERA = { position: [0, -5, 3], focal_point: [0, 0, 0], view_up: [
 export const SCENE = { color: 'rgb', camera: CAMERA };
 const INFO = { name: 'town', bounds: { min: [0, 0, 0], max: [1, 1, 1] }, limits: { max_message_bytes: 1e6 } };
 
-/** A viewer, and the server's end of its connection. */
-export function connectedViewer() {
+/** A viewer that was opened with the settings of a link, and the server's end of its connection. */
+export function connectedViewer(linkPatch = {}) {
   const frames = [];
   const timers = new FakeTimers();
   const page = new EventTarget();
@@ -69,7 +69,7 @@ export function connectedViewer() {
     window: page,
     document: page,
   });
-  const viewer = new Viewer({});
+  const viewer = new Viewer(linkPatch);
   viewer.connect();
   const server = {
     /** The messages of a type that the page has sent on its newest connection. */

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { encodeHash, decodeHash, viewPatch } from '../page/link.js';
+import { encodeHash, decodeHash, readLink, viewPatch } from '../page/link.js';
 import { combinePatches, mergePatch, createPatch, patchAt, valueAt } from '../page/merge-patch.js';
 
 const initialScene = {
@@ -38,21 +38,43 @@ test('hashes are URL-safe, and keep any name and micrometres', () => {
 
 test('links carry valid measurements', () => {
   const figure = { kind: 'distance', name: 'distance 1', points: [[1, 2, 3], [4, 5, 6]] };
-  assert.deepEqual(decodeHash(encodeHash({}, [figure])), { patch: {}, measurements: [figure] });
+  assert.deepEqual(decodeHash(encodeHash({}, [figure])), { patch: {}, measurements: [figure], n_invalid: 0 });
   const invalid = [
     null, 7, {}, { ...figure, kind: 'toString' }, { ...figure, name: 5 }, { ...figure, name: 'a'.repeat(101) },
     { ...figure, points: [[1, 2, 3]] }, { ...figure, points: [[1, 2], [3, 4]] }, { ...figure, points: [[1, 2, 'x'], [1, 2, 3]] },
     { ...figure, kind: 'area' },
   ];
   const many = Array(2000).fill(figure);
-  assert.deepEqual(decodeHash(encodeHash({ color: 'rgb' }, [...invalid, ...many])), { patch: { color: 'rgb' }, measurements: many });
-  assert.deepEqual(decodeHash(encodeHash({ measurements: 'text' })), { patch: {}, measurements: [] });
+  const mixed = decodeHash(encodeHash({ color: 'rgb' }, [...invalid, ...many]));
+  assert.deepEqual(mixed, { patch: { color: 'rgb' }, measurements: many, n_invalid: invalid.length });
+  assert.deepEqual(decodeHash(encodeHash({ measurements: 'text' })), { patch: {}, measurements: [], n_invalid: 1 });
+});
+
+test('links carry measurements unless they are those of the scene', () => {
+  const figure = { kind: 'annotation', name: 'ridge', points: [[1, 2, 3]] };
+  assert.equal(encodeHash({}, [figure], [figure]), '');
+  assert.equal(decodeHash(encodeHash({ color: 'rgb' }, [figure], [figure])).measurements, null);
+  assert.deepEqual(decodeHash(encodeHash({}, [], [figure])).measurements, []);
+  assert.deepEqual(viewPatch({ measurements: [figure] }, { color: 'rgb' }), { color: 'rgb' });
 });
 
 test('invalid hashes are ignored', () => {
   for (const hash of ['', '#', '#top', '#view=', '#view=!!!', '#view=YWJj', '#view=WzFd']) {
     assert.equal(decodeHash(hash), null, hash);
   }
+});
+
+test('what is invalid in a link is reported', () => {
+  const reports = (hash) => {
+    const texts = [];
+    readLink(hash, (text) => texts.push(text));
+    return texts;
+  };
+  const hash = encodeHash({ color: 'elevation' }, [{ kind: 'distance', name: 'distance 1', points: [[1, 2, 3], [4, 5, 6]] }]);
+  for (const fine of ['', '#', '#top', hash]) assert.deepEqual(reports(fine), []);
+  for (const broken of ['#view=', '#view=!!!', hash.slice(0, 26)]) assert.match(reports(broken)[0], /broken or incomplete/, broken);
+  assert.match(reports(encodeHash({ measurements: [7] }))[0], /invalid measurements/);
+  assert.deepEqual(readLink('#view=!!!', () => {}), { patch: {}, measurements: null });
 });
 
 test('patches merge as RFC 7386 defines', () => {

@@ -4,8 +4,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { geoJson } from '../page/geojson.js';
 import { decodeHash, encodeHash } from '../page/link.js';
+import { isMeasurement, pathLength } from '../page/figures.js';
 import {
-  angleDegrees, area, circleThrough, corner, distances, isMeasurement, levelArea, middle, pathLength, perimeter, resultsOf,
+  angleDegrees, area, circleThrough, corner, distances, levelArea, middle, perimeter, resultsOf,
 } from '../page/measure.js';
 
 const up = [0, 0, 1];
@@ -68,6 +69,17 @@ test('measurements become GeoJSON in the coordinates of the file', () => {
   assert.deepEqual(features[0].properties, { name: 'roof', kind: 'area', unit: 'm', area: 6, level_area: 6, perimeter: 12 });
   assert.deepEqual([features[1].geometry.type, features[1].properties.length], ['LineString', 7]);
   assert.equal(geoJson([], { up }).crs, undefined);
+});
+
+test('results in GeoJSON have no rounding errors', () => {
+  const points = [[east, north, 105.24], [east, north, 107.01]];
+  const { features: [height, note] } = geoJson([
+    { kind: 'height', name: 'height 1', points }, { kind: 'annotation', name: 'ridge', points: [points[1]] },
+  ], { up });
+  assert.equal(height.properties.height, 1.77);
+  assert.deepEqual(note, {
+    type: 'Feature', properties: { name: 'ridge', kind: 'annotation' }, geometry: { type: 'Point', coordinates: points[1] },
+  });
 });
 
 test('volumes have their results from the server, and links have none', () => {

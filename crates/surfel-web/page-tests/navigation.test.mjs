@@ -2,9 +2,10 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { completed } from '../page/camera.js';
+import { completed, focalDistance } from '../page/camera.js';
 import { Navigation } from '../page/navigation.js';
 import { signal } from '../page/signal.js';
+import { distance } from '../page/vector.js';
 
 const current = { position: [1, 2, 3], focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 35 };
 const { view_angle, ...place } = current;
@@ -31,5 +32,28 @@ test('the camera moves to a place, and the server finds one that is not given', 
   assert.deepEqual(movedTo(there), { set: [{ ...current, ...there }], found: [] });
   for (const open of [{}, { position: [0, 90, 2] }, { azimuth_angle: 30 }, { ...there, orthographic: true }]) {
     assert.deepEqual(movedTo(open).found, [open]);
+  }
+});
+
+test('flying ends at a nearest and a farthest place, and leads back', () => {
+  const bounds = { min: [-3, -4, 0], max: [3, 4, 0] };
+  const start = { position: [0, -10, 5], focal_point: [0, 0, 0], view_up: [0, 0, 1] };
+  for (const projection of [{ view_angle: 35 }, { orthographic: 8 }]) {
+    const viewer = {
+      camera: { ...start, ...projection }, info: { bounds }, viewReplaced: signal(), setCamera(camera) { viewer.camera = camera; },
+    };
+    const navigation = new Navigation(viewer);
+    const fly = (direction) => {
+      for (let i = 0; i < 2000; i++) navigation.fly(direction, 0.1, 4);
+      return viewer.camera;
+    };
+    for (const direction of [[0, 0, -1], [1, 0, 0], [0, 1, 0]]) {
+      const { position, orthographic = 0 } = fly(direction);
+      assert.ok(distance(position, [0, 0, 0]) <= 500 && orthographic <= 500, `${direction}: ${position} ${orthographic}`);
+      const there = viewer.camera;
+      navigation.fly(direction.map((value) => -value), 0.1, 4);
+      assert.notDeepEqual(viewer.camera, there);
+    }
+    assert.ok(1e-4 <= (fly([0, 0, 1]).orthographic ?? focalDistance(viewer.camera)));
   }
 });

@@ -8,7 +8,7 @@ import { fakeDocument, settled } from './fake-dom.mjs';
 
 const first = { kind: 'profile', name: 'profile 1', points: [[0, 0, 0], [10, 0, 0]], width: 1 };
 const second = { ...first, name: 'profile 2', points: [[0, 5, 0], [20, 5, 0]] };
-const profile = { distances: [1, 2], offsets: [0, 0], heights: [3, 4], colors: [[1, 2, 3], [4, 5, 6]], n_found: 2 };
+const profile = { distances: [1, 2], offsets: [0, 0], heights: [3, 4], positions: [[1, 0, 3], [2, 0, 4]], colors: [[1, 2, 3], [4, 5, 6]], n_found: 2 };
 
 /** A card whose requests wait until `answers` are called. */
 function openCard() {

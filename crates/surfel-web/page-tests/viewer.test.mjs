@@ -175,3 +175,19 @@ test('a connection that is never opened is given up', () => {
   wait(50_000);
   assert.equal(nAttempts, 3);
 });
+
+test('settings that are too long for the server are left out, and the connection lasts', () => {
+  const long = 'x'.repeat(300_000);
+  const opened = connectedViewer({ caption: long });
+  assert.deepEqual(opened.server.sent('hello')[0].scene, {});
+  assert.equal(opened.viewer.scene.caption, undefined);
+  const { viewer, server, nextFrame } = connectedViewer({ caption: 'short' });
+  const rejections = [];
+  viewer.rejected.listen(({ text }) => rejections.push(text));
+  assert.equal(server.sent('hello')[0].scene.caption, 'short');
+  viewer.changeSettings({ caption: long.repeat(4) });
+  nextFrame();
+  assert.deepEqual([server.sent('set').length, viewer.scene.caption, rejections.length], [0, undefined, 1]);
+  viewer.request({ type: 'export', width: 3, height: 2 });
+  assert.equal(server.sent('export').length, 1);
+});

@@ -142,6 +142,13 @@ export function translate(camera, offset) {
   return { ...camera, position: add(camera.position, offset), focal_point: add(camera.focal_point, offset) };
 }
 
+/** The camera after `translate`, or as it was where it would be farther away than zoom allows. */
+export function translateWithin(bounds, camera, offset) {
+  const moved = translate(camera, offset);
+  const [before, after] = [camera, moved].map(({ position }) => distance(position, mix(bounds.min, bounds.max, 0.5)));
+  return maxRange(bounds) < after && before < after ? camera : moved;
+}
+
 /** Moves the point at this depth from one pixel to another. */
 export function pan(camera, size, from, to, depth) {
   const start = pointAtDepth(camera, size, from.x, from.y, depth);
@@ -160,13 +167,15 @@ export function zoomTo(camera, target, factor) {
   return { ...translate(camera, scale(sideways, 1 - factor)), orthographic: camera.orthographic * factor };
 }
 
+/** Maximum distance of a camera from the middle of `bounds`, and height of its orthographic picture; a single point has none. */
+const maxRange = ({ min, max }) => FARTHEST_ZOOM * distance(min, max) || Infinity;
+
 /** The camera after `zoomTo`, or as it was where it would be so near or far that nothing could be told apart. */
 export function zoomWithin(bounds, camera, target, factor) {
   const zoomed = zoomTo(camera, target, factor);
-  const diagonal = distance(bounds.min, bounds.max);
   const center = mix(bounds.min, bounds.max, 0.5);
-  const isTooNear = (zoomed.orthographic ?? focalDistance(zoomed)) < NEAREST_ZOOM * diagonal;
-  const isTooFar = 0 < diagonal && FARTHEST_ZOOM * diagonal < (zoomed.orthographic ?? distance(zoomed.position, center));
+  const isTooNear = (zoomed.orthographic ?? focalDistance(zoomed)) < NEAREST_ZOOM * distance(bounds.min, bounds.max);
+  const isTooFar = maxRange(bounds) < (zoomed.orthographic ?? distance(zoomed.position, center));
   return (factor < 1 ? isTooNear : isTooFar) ? camera : zoomed;
 }
 

@@ -3,13 +3,14 @@
 import { copyText } from './copy.js';
 import { download, element } from './dom.js';
 import { stemOf } from './format.js';
+import { withoutResults } from './link.js';
 import { setUpPointsExport } from './points-export.js';
 import { showToast } from './toast.js';
 
 const FORMATS = { command: 'Command', toml: 'TOML', json: 'JSON', link: 'Link' };
 
 /** Returns a function that opens the dialog. */
-export function setUpExportDialog(viewer, viewHistory) {
+export function setUpExportDialog(viewer, viewHistory, measureTool) {
   const dialog = document.getElementById('export-dialog');
   const text = document.getElementById('export-text');
   const tabs = document.getElementById('export-tabs');
@@ -46,8 +47,9 @@ export function setUpExportDialog(viewer, viewHistory) {
     show();
     beginPoints();
     dialog.showModal();
+    const measurements = measureTool.figures.map(withoutResults);
     try {
-      exported = { ...exported, ...(await viewer.request({ type: 'export', ...viewer.size })) };
+      exported = { ...exported, ...(await viewer.request({ type: 'export', ...viewer.size, measurements })) };
     } catch (error) {
       showToast(error.message);
     }

@@ -1,11 +1,12 @@
 // GeoJSON (RFC 7946) of measurements, in the coordinates of the file, whose system the older member `crs` names.
 
+import { exact } from './format.js';
 import { resultsOf } from './measure.js';
 
 /** A feature collection of measurements. */
 export function geoJson(measurements, { up, epsg, unit }) {
   const features = measurements.map((figure) => {
-    const results = resultsOf(figure, up).map(({ name, value }) => [name.toLowerCase().replaceAll(' ', '_'), value]);
+    const results = resultsOf(figure, up).map(({ name, value }) => [name.toLowerCase().replaceAll(' ', '_'), Number(exact(value))]);
     return {
       type: 'Feature',
       properties: { name: figure.name, kind: figure.kind, ...(unit ? { unit } : {}), ...Object.fromEntries(results) },
@@ -18,6 +19,7 @@ export function geoJson(measurements, { up, epsg, unit }) {
 
 function geometryOf({ kind, points }) {
   if (kind === 'area' || kind === 'volume') return { type: 'Polygon', coordinates: [[...points, points[0]]] };
+  if (kind === 'annotation') return { type: 'Point', coordinates: points[0] };
   if (kind === 'circle') return { type: 'MultiPoint', coordinates: points };
   return { type: 'LineString', coordinates: points };
 }

@@ -104,11 +104,12 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
   window.addEventListener('keydown', (event) => {
     if (document.querySelector('dialog[open]')) return;
     if (event.key === 'Escape') actions.escape();
-    if (!viewer.camera || event.altKey || usesKeys(event.target)) return;
+    if (!viewer.camera || event.altKey) return;
     if (event.ctrlKey || event.metaKey) {
-      undoOrRedo(event);
+      if (!undoesTyping(event.target)) undoOrRedo(event);
       return;
     }
+    if (usesKeys(event.target)) return;
     if (event.key === 'Enter' && !event.target.closest('button, summary, a')) actions.enter();
     if (ORBIT_DIRECTIONS[event.key]) {
       if (event.target.closest('#panel')) return;
@@ -128,6 +129,11 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
   });
   window.addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
   window.addEventListener('blur', () => held.clear());
+}
+
+/** Whether the focused element is a field whose text the browser itself undoes. */
+function undoesTyping(target) {
+  return target.matches('textarea, input:not([type="range"], [type="checkbox"], [type="color"])');
 }
 
 /** Whether the focused element is a control that keys are meant for. A button that was clicked keeps its focus, but not the keys. */

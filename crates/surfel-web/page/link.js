@@ -1,13 +1,13 @@
 // Links: the address of a view holds, after `#`, the patch between the initial scene and the view, and measurements.
 
-import { isMeasurement } from './measure.js';
-import { createPatch } from './merge-patch.js';
+import { isMeasurement } from './figures.js';
+import { areEqual, createPatch } from './merge-patch.js';
 
 /** The content of an address without a link. */
-export const NO_LINK = { patch: {}, measurements: [] };
+const NO_LINK = { patch: {}, measurements: null };
 const PREFIX = '#view=';
-/** Keys of the window and the files, which are not part of a view. */
-const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output'];
+/** Keys of the window and the files, which are not part of a view, and of measurements, which are not part of its patch. */
+const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output', 'measurements'];
 
 /** The patch that changes `initialScene` into `scene`. */
 export function viewPatch(initialScene, scene) {
@@ -16,9 +16,10 @@ export function viewPatch(initialScene, scene) {
   return patch;
 }
 
-/** The hash of an address for a patch and measurements; empty if there are none. */
-export function encodeHash(patch, measurements = []) {
-  const content = measurements.length ? { ...patch, measurements: measurements.map(withoutResults) } : patch;
+/** The hash of an address for a patch and measurements; empty if there are none but the initial ones. */
+export function encodeHash(patch, measurements = [], initialMeasurements = []) {
+  const own = measurements.map(withoutResults);
+  const content = areEqual(own, initialMeasurements) ? patch : { ...patch, measurements: own };
   if (Object.keys(content).length === 0) return '';
   const text = JSON.stringify(content, (_, value) => (typeof value === 'number' ? rounded(value) : value));
   const bytes = new TextEncoder().encode(text);
@@ -26,7 +27,18 @@ export function encodeHash(patch, measurements = []) {
   return PREFIX + base64.replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
 }
 
-/** The `{ patch, measurements }` in the hash of an address; null if it has no valid patch. Invalid measurements are left out. */
+/** The content of an address; `report` is called with a text on what is left out of it because it is invalid. */
+export function readLink(hash, report) {
+  const link = decodeHash(hash);
+  if (!link && hash.startsWith(PREFIX)) report('The link is broken or incomplete: it has no effect.');
+  if (link?.n_invalid) report('The link has invalid measurements, which are left out.');
+  return link ?? NO_LINK;
+}
+
+/**
+ * The `{ patch, measurements, n_invalid }` in the hash of an address; null if it has no valid patch. Measurements are null
+ * where the link keeps the initial ones. Invalid measurements are counted and left out.
+ */
 export function decodeHash(hash) {
   if (!hash.startsWith(PREFIX)) return null;
   const base64 = hash.slice(PREFIX.length).replaceAll('-', '+').replaceAll('_', '/');
@@ -35,14 +47,17 @@ export function decodeHash(hash) {
     const content = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
     if (typeof content !== 'object' || content === null || Array.isArray(content)) return null;
     const { measurements, ...patch } = content;
-    return { patch, measurements: Array.isArray(measurements) ? measurements.filter(isMeasurement).map(withoutResults) : [] };
+    if (measurements === undefined) return { patch, measurements: null, n_invalid: 0 };
+    const all = Array.isArray(measurements) ? measurements : [measurements];
+    const valid = all.filter(isMeasurement).map(withoutResults);
+    return { patch, measurements: valid, n_invalid: all.length - valid.length };
   } catch {
     return null;
   }
 }
 
-/** The results of a volume come from the server. */
-function withoutResults(figure) {
+/** A figure without the results of a volume, which come from the server. */
+export function withoutResults(figure) {
   if (!figure?.volume) return figure;
   const { volume, ...others } = figure;
   return others;

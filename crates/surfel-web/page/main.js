@@ -11,7 +11,7 @@ import { element } from './dom.js';
 import { histogramRows } from './histogram.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
-import { NO_LINK, decodeHash } from './link.js';
+import { readLink } from './link.js';
 import { MEASURE_TOOLS, MeasureTool } from './measure-tool.js';
 import { Navigation } from './navigation.js';
 import { objectSection } from './object-controls.js';
@@ -29,22 +29,27 @@ import { setUpToolbar } from './toolbar.js';
 import { Viewer } from './viewer.js';
 import { ViewHistory } from './view-history.js';
 import { viewRows } from './view-section.js';
-import { setUpVolumes } from './volume.js';
 
-const link = decodeHash(location.hash) ?? NO_LINK;
+const link = readLink(location.hash, showToast);
 const viewer = new Viewer(link.patch);
 const navigation = new Navigation(viewer);
 const panel = new Panel(viewer);
 const viewport = document.getElementById('viewport');
 const overlay = new Overlay(document.getElementById('overlay'), viewer);
 const pickCard = new PickCard(viewer, overlay);
-const measureTool = new MeasureTool(viewer, overlay);
+const measureTool = new MeasureTool(viewer, overlay, whenNeeded(async () => {
+  const { MeasureCard } = await import('./measure-card.js');
+  const card = new MeasureCard(viewer, overlay, measureTool);
+  return (figureIdx) => card.show(figureIdx);
+}));
 const viewHistory = new ViewHistory(viewer, measureTool);
 const cursorCoordinates = new CursorCoordinates(viewer);
 const crosshair = new Crosshair(viewer, overlay);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
+/** Whether the measurements of the link or the scene were shown. */
+let areFirstShown = false;
 /** The promise of the last pick, as `pickAfter` returns it. */
 let lastPick = null;
 
@@ -60,14 +65,13 @@ const openProfile = whenNeeded(async () => {
   return (figure) => profileCard.open(figure);
 });
 const openPathCard = whenNeeded(async () => (await import('./path-card.js')).setUpPathCard(viewer, navigation));
-const openExportDialog = whenNeeded(async () => (await import('./export-dialog.js')).setUpExportDialog(viewer, viewHistory));
+const openExportDialog = whenNeeded(async () => (await import('./export-dialog.js')).setUpExportDialog(viewer, viewHistory, measureTool));
 
 setUpNotifications(viewer);
 setUpStatusLine(viewer);
 setUpLegend(viewer);
 setUpAxisCube(viewer, navigation);
 makeRoomForAnnotations(viewer);
-setUpVolumes(viewer, measureTool);
 measureTool.profileOpened.listen(openProfile);
 setUpSceneLoading(viewer, measureTool, addFiles);
 setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp, crosshair: showCrosshair });
@@ -122,7 +126,8 @@ setUpKeyboard(viewer, navigation, viewHistory, {
 new Picture(document.getElementById('picture'), viewer);
 exposeState(viewer);
 // The results need the up axis of the data.
-viewer.infoChanged.listen(showLinkedMeasurements);
+viewer.infoChanged.listen(showFirstMeasurements);
+viewer.measurementsLoaded.listen((figures) => { measureTool.figures = figures; });
 viewer.connect();
 
 /** Returns a function that calls the one that `load` resolves to, whose module is loaded at the first call. */
@@ -165,9 +170,11 @@ function followCrosshair() {
   cursorCoordinates.moveTo(crosshair.pixel);
 }
 
-/** Shows the measurements of the link with which the page was opened. */
-function showLinkedMeasurements() {
-  if (link.measurements.length) measureTool.figures = link.measurements.splice(0);
+/** Shows the measurements of the link with which the page was opened, or those of the scene. */
+function showFirstMeasurements() {
+  if (areFirstShown) return;
+  areFirstShown = true;
+  measureTool.figures = link.measurements ?? viewer.initialMeasurements;
 }
 
 /** Sends a pick at once; resolves to its `{ point }` or `{ error }` after the pick before it, so that points come in the order of the clicks. */

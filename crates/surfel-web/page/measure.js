@@ -1,32 +1,9 @@
-// Measurements: lengths, heights, angles, circles and areas of points in the world.
+// Results of measurements: lengths, heights, angles, circles and areas of points in the world.
 
+import { pathLength } from './figures.js';
 import { levelLength } from './profile.js';
-import { isVolume, volumeResults } from './volume-results.js';
+import { volumeResults } from './volume-results.js';
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
-
-/** Kinds of measurements: the least number of their points, and their number if it is fixed. */
-export const KINDS = {
-  distance: { least: 2, fixed: 2 },
-  height: { least: 2, fixed: 2 },
-  angle: { least: 3, fixed: 3 },
-  circle: { least: 3, fixed: 3 },
-  polyline: { least: 2 },
-  area: { least: 3 },
-  profile: { least: 2 },
-  volume: { least: 3 },
-};
-const MAX_NAME_LENGTH = 100;
-
-/** Whether a value from a link is a measurement: `{ kind, name, points }`, and the `width` of a profile or the base of a volume. */
-export function isMeasurement(value) {
-  const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
-  if (!Object.hasOwn(KINDS, value?.kind) || typeof value.name !== 'string' || MAX_NAME_LENGTH < value.name.length) return false;
-  const { least, fixed = Infinity } = KINDS[value.kind];
-  const n = Array.isArray(value.points) ? value.points.length : 0;
-  const hasWidth = value.kind !== 'profile' || (Number.isFinite(value.width) && 0 < value.width);
-  const hasBase = value.kind !== 'volume' || isVolume(value);
-  return least <= n && n <= fixed && value.points.every(isPoint) && hasWidth && hasBase;
-}
 
 const horizontalPart = (offset, up) => addScaled(offset, up, -dot(offset, up));
 
@@ -49,11 +26,6 @@ export function levelArea(points, up) {
 /** Length of a polygon's outline, from the last point back to the first. */
 export function perimeter(points) {
   return points.reduce((sum, point, i) => sum + distance(point, points[(i + 1) % points.length]), 0);
-}
-
-/** Length of the lines between consecutive points. */
-export function pathLength(points) {
-  return points.slice(1).reduce((sum, point, i) => sum + distance(points[i], point), 0);
 }
 
 /** Angle at `b` between the directions to `a` and `c`, in degrees. */
@@ -100,6 +72,7 @@ function newell(points) {
  */
 export function resultsOf(figure, up) {
   const { kind, points } = figure;
+  if (kind === 'annotation') return [];
   if (kind === 'volume') return volumeResults(figure);
   if (kind === 'area') {
     return [

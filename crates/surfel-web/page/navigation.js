@@ -87,15 +87,16 @@ export class Navigation {
 
   /** Flies to the right, up and forward for this many seconds. */
   fly([x, y, z], seconds, speed) {
-    const { camera } = this;
+    const { camera, viewer } = this;
+    const { bounds } = viewer.info;
     const { right, up, forward } = cameras.axesOf(camera);
     const distance = seconds * speed * FLY_SPEED * cameras.focalDistance(camera);
     const sideways = addScaled(scale(right, x * distance), up, y * distance);
     if (cameras.isOrthographic(camera)) {
-      const nearer = cameras.zoomTo(camera, camera.focal_point, Math.exp(-z * seconds * speed * FLY_SPEED));
-      this.#move(cameras.translate(nearer, sideways));
+      const nearer = cameras.zoomWithin(bounds, camera, camera.focal_point, Math.exp(-z * seconds * speed * FLY_SPEED));
+      this.#move(cameras.translateWithin(bounds, nearer, sideways));
     } else {
-      this.#move(cameras.translate(camera, addScaled(sideways, forward, z * distance)));
+      this.#move(cameras.translateWithin(bounds, camera, addScaled(sideways, forward, z * distance)));
     }
   }
 
@@ -145,6 +146,7 @@ export class Navigation {
   /** Moves the camera to where it was at the start. */
   goHome() {
     const { info, initialScene } = this.viewer;
+    this.stop();
     if (info.camera_moves && !initialScene.camera.lock) this.viewer.resumeAnimation();
     else this.transitionTo(initialScene.camera);
   }

@@ -1,4 +1,4 @@
-// The overlay over the picture: lines, labels and handles in the world, projected with the camera of the picture.
+// The overlay over the picture: lines and handles in the world, projected with the camera of the picture.
 
 import { depthOf, project } from './camera.js';
 import { svg } from './dom.js';
@@ -8,9 +8,6 @@ import { mix } from './vector.js';
 const NEAR_FRACTION = 1e-3;
 /** Number of segments of a line in a panorama, where straight lines are curved. */
 const N_CURVE_SEGMENTS = 32;
-const LABEL_LINE_HEIGHT = 16;
-const LABEL_GAP = 10;
-const LABEL_SPACING = 3;
 /** Time between two questions about hidden points. */
 const QUESTION_PAUSE_MS = 150;
 /** Maximum number of points of a question. */
@@ -46,6 +43,7 @@ export class Overlay {
       const camera = this.viewer.shownCamera;
       if (!camera) return;
       const anchors = new Map();
+      /** Whether surfaces hide all of these points, as far as the server has said. */
       const isHidden = (points) => {
         for (const point of points) anchors.set(`${point}`, point);
         return points.every((point) => this.#hidden.has(`${point}`));
@@ -86,26 +84,27 @@ const keyOf = (points, frame) => `${frame?.frame} ${points.join(' ')}`;
 function viewOf(camera, size, isHidden) {
   const toPixel = (point) => project(camera, size, point);
 
-  const lineBetween = (from, to, className) => svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y });
-
-  const straight = (a, b, className) => {
+  const straight = (a, b) => {
     const [depthA, depthB] = [depthOf(camera, a), depthOf(camera, b)];
     const near = NEAR_FRACTION * Math.max(depthA, depthB);
     if (!(0 < near)) return [];
     const cut = () => mix(a, b, (near - depthA) / (depthB - depthA));
     const [from, to] = [toPixel(depthA < near ? cut() : a), toPixel(depthB < near ? cut() : b)];
-    return from && to ? [lineBetween(from, to, className)] : [];
+    return from && to ? [[from, to]] : [];
   };
 
-  /** Draws a line in a panorama; segments that cross from one side of the picture to the other are left out. */
-  const curved = (a, b, className) => {
+  /** A line in a panorama; parts that cross from one side of the picture to the other are left out. */
+  const curved = (a, b) => {
     const pixels = Array.from({ length: N_CURVE_SEGMENTS + 1 }, (_, i) => toPixel(mix(a, b, i / N_CURVE_SEGMENTS)));
     const isVisible = ([from, to]) => from && to && Math.abs(from.x - to.x) < size.width / 2;
-    const segments = pixels.slice(1).map((to, i) => [pixels[i], to]).filter(isVisible);
-    return segments.map(([from, to]) => lineBetween(from, to, className));
+    return pixels.slice(1).map((to, i) => [pixels[i], to]).filter(isVisible);
   };
 
-  const line = camera.panorama ? curved : straight;
+  /** A line between two points as pairs of pixels. */
+  const segments = camera.panorama ? curved : straight;
+
+  const line = (a, b, className) => segments(a, b).map(([from, to]) =>
+    svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y }));
 
   const path = (points, className, isClosed) => points.flatMap((point, i) => {
     const next = points[i + 1] ?? (isClosed ? points[0] : null);
@@ -124,30 +123,7 @@ function viewOf(camera, size, isHidden) {
     return pixel ? [svg('circle', { class: className, cx: pixel.x, cy: pixel.y, r: radius, ...attributes })] : [];
   };
 
-  /** Frames of the labels so far. */
-  const labels = [];
-  const overlaps = (a, b) => Math.abs(a.x - b.x) < (a.width + b.width) / 2 && Math.abs(a.y - b.y) < (a.height + b.height) / 2;
-
-  /** A label with lines of text above a point, and above earlier labels; none if what it labels, `points`, is hidden. */
-  const label = (point, lines, points) => {
-    const foot = toPixel(point);
-    if (!foot || isHidden(points)) return [];
-    const width = 14 + 6.7 * Math.max(...lines.map((text) => text.length));
-    const height = 8 + LABEL_LINE_HEIGHT * lines.length;
-    const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP, width, height };
-    for (let below = labels.find((other) => overlaps(at, other)); below; below = labels.find((other) => overlaps(at, other))) {
-      at.y = below.y - (below.height + height) / 2 - LABEL_SPACING;
-    }
-    labels.push(at);
-    const texts = lines.map((text, i) =>
-      svg('text', { x: at.x, y: at.y - height / 2 + LABEL_LINE_HEIGHT * (i + 1) }, text));
-    const frame = svg('rect', { x: at.x - width / 2, y: at.y - height / 2, width, height, rx: 6 });
-    return [svg('g', { class: 'label' }, frame, ...texts)];
-  };
-
-  const rubberBand = (from, to) => lineBetween(from, to, 'measure-rubber-band');
-
-  return { camera, size, toPixel, line, path, polygon, dot, label, rubberBand };
+  return { camera, size, toPixel, segments, line, path, polygon, dot, isHidden };
 }
 
 /** Paints a cross at the pivot while the user moves the camera. */

@@ -2,7 +2,7 @@
 
 import { download, element, iconButton } from './dom.js';
 import { count, counted, rounded, stemOf, withUnit } from './format.js';
-import { chartOf, levelLength, nearestPoint, positionsOf } from './profile.js';
+import { chartOf, levelLength, nearestPoint } from './profile.js';
 import { csvOf, svgOf } from './profile-files.js';
 import { showToast } from './toast.js';
 
@@ -135,8 +135,8 @@ export class ProfileCard {
   /** Shows the point next to a pixel of the chart, here and in the picture. */
   #mark(pixel) {
     const i = pixel && this.#chart ? nearestPoint(this.#profile, this.#chart, pixel, MAX_POINTER_DISTANCE) : -1;
-    const { unit, up } = this.viewer.info;
-    this.#marked = i < 0 ? null : positionsOf(pick(this.#profile, i), this.#figure.points, up)[0];
+    const { unit } = this.viewer.info;
+    this.#marked = i < 0 ? null : this.#profile.positions[i];
     const at = () => `distance ${withUnit(rounded(this.#profile.distances[i], 6), unit)}, height ${withUnit(rounded(this.#profile.heights[i], 8), unit)}`;
     this.readout.textContent = i < 0 ? this.summary : at();
     this.overlay.redraw();
@@ -144,15 +144,14 @@ export class ProfileCard {
 
   #download(format) {
     const { info } = this.viewer;
+    const { positions, n_found } = this.#profile;
     const contents = {
-      csv: () => csvOf(this.#profile, this.#figure.points, info.up),
+      csv: () => csvOf(this.#profile),
       svg: () => svgOf(this.#profile, this.#chartOf({ width: 1200, height: 400 }), info.unit),
     };
-    download(new Blob([contents[format]()]), `${stemOf(info.name)}-${this.#figure.name.replaceAll(' ', '-')}.${format}`);
+    const isThinned = positions.length < n_found;
+    const part = isThinned ? `-${positions.length}-of-${n_found}-points` : '';
+    if (isThinned) showToast(`The file has ${count(positions.length)} of ${counted(n_found, 'point')}, a random choice.`);
+    download(new Blob([contents[format]()]), `${stemOf(info.name)}-${this.#figure.name.replaceAll(' ', '-')}${part}.${format}`);
   }
-}
-
-/** The profile with only its point `i`. */
-function pick({ distances, offsets, heights }, i) {
-  return { distances: [distances[i]], offsets: [offsets[i]], heights: [heights[i]] };
 }

@@ -1,19 +1,11 @@
 // Height profiles as files: their points as CSV, their chart as SVG.
 
 import { rounded } from './format.js';
-import { MARGIN, levelLength, positionsOf } from './profile.js';
+import { MARGIN } from './profile.js';
 
-/** Step of coordinates in files as a fraction of the line's length. */
-const COORDINATE_STEP = 1e-5;
-
-/** The points of a profile as comma-separated values, with a line of names. Coordinates have the decimals that the line's length makes sensible. */
-export function csvOf(profile, points, up) {
-  const positions = positionsOf(profile, points, up);
-  const nDecimals = Math.min(12, Math.max(0, Math.ceil(-Math.log10(COORDINATE_STEP * levelLength(points, up)))));
-  const rows = profile.distances.map((distance, i) => {
-    const position = positions[i].map((value) => Number(value.toFixed(nDecimals)));
-    return [distance, profile.offsets[i], profile.heights[i], ...position, ...profile.colors[i]].join(',');
-  });
+/** The points of a profile as comma-separated values, with a line of names. Coordinates and heights are those of the files. */
+export function csvOf({ distances, offsets, heights, positions, colors }) {
+  const rows = distances.map((distance, i) => [distance, offsets[i], heights[i], ...positions[i], ...colors[i]].join(','));
   return `distance,offset,height,x,y,z,red,green,blue\n${rows.join('\n')}\n`;
 }
 

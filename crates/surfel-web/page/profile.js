@@ -1,4 +1,4 @@
-// Height profiles: places of their points in the world, and their chart.
+// Height profiles: their strip in the world, and their chart.
 
 import { ticks } from './format.js';
 import { addScaled, cross, dot, length, normalize, subtract } from './vector.js';
@@ -8,16 +8,6 @@ export const MARGIN = { left: 64, right: 14, top: 12, bottom: 28 };
 /** Part of the chart's height that stays free above and below the points. */
 const FREE_HEIGHT = 0.06;
 const [TICK_DISTANCE_X, TICK_DISTANCE_Y] = [90, 36];
-
-/** World positions of the points of a profile along the line of `points`. */
-export function positionsOf({ distances, offsets, heights }, points, up) {
-  const segments = segmentsOf(points, up);
-  return distances.map((along, i) => {
-    const segment = segments.findLast(({ distance }) => distance <= along) ?? segments[0];
-    const level = addScaled(addScaled(segment.start, segment.along, along - segment.distance), segment.left, offsets[i]);
-    return addScaled(level, up, heights[i] - dot(level, up));
-  });
-}
 
 /** Length of a line over level ground. */
 export function levelLength(points, up) {

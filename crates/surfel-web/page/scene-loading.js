@@ -1,7 +1,7 @@
 // Files from the file button or dropped on the page: scene files are shown, others are added. Links typed into the address
 // bar.
 
-import { NO_LINK, decodeHash } from './link.js';
+import { readLink } from './link.js';
 import { showToast } from './toast.js';
 
 const isSceneFile = ({ name }) => /\.(toml|json)$/i.test(name);
@@ -37,9 +37,9 @@ export function setUpSceneLoading(viewer, measureTool, addFiles) {
   });
   window.addEventListener('hashchange', () => {
     if (!viewer.isConnected) return;
-    const { patch, measurements } = decodeHash(location.hash) ?? NO_LINK;
+    const { patch, measurements } = readLink(location.hash, showToast);
     viewer.showLink(patch);
-    measureTool.figures = measurements;
+    measureTool.figures = measurements ?? viewer.initialMeasurements;
   });
   const lost = sessionStorage.getItem(ADDED);
   if (lost) showToast(`${lost}: added to the page, and not kept when it is loaded again. Add it again.`);

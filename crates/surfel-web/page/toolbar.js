@@ -12,6 +12,7 @@ const HINTS = {
   polyline: 'Click on the points of a line. Double click or Enter ends it.',
   profile: 'Click on the points of a line. Double click or Enter shows the heights along it.',
   area: 'Click on the corners. Double click or Enter closes the area.',
+  annotation: 'Click on a point to pin a text to it.',
   volume: 'Click on the corners of an area. Double click or Enter computes cut and fill.',
 };
 

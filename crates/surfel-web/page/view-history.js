@@ -23,7 +23,9 @@ export class ViewHistory {
     this.viewer = viewer;
     this.measureTool = measureTool;
     const noteChange = () => {
+      const isFirst = !this.#isChanged;
       this.#isChanged = true;
+      if (isFirst) this.changed();
       this.#schedule();
     };
     viewer.changedByUser.listen(noteChange);
@@ -59,7 +61,7 @@ export class ViewHistory {
     const { viewer } = this;
     if (viewer.initialScene) {
       const { patch, measurements } = this.#state();
-      history.replaceState(null, '', encodeHash(withoutAdded(patch, viewer.addedFiles), measurements) || location.pathname + location.search);
+      history.replaceState(null, '', encodeHash(withoutAdded(patch, viewer.addedFiles), measurements, viewer.initialMeasurements) || location.pathname + location.search);
     }
     return location.href;
   }
@@ -113,7 +115,7 @@ export class ViewHistory {
     this.#dataName = name;
     if (!isOther) return;
     [this.#states, this.#currentIdx] = [[], -1];
-    this.measureTool.figures = [];
+    this.measureTool.figures = this.viewer.initialMeasurements;
     this.#isChanged = false;
     this.changed();
   }

@@ -10,6 +10,8 @@ import { signal } from './signal.js';
 const MAX_LATENCIES = 600;
 /** Minimum duration between two messages about the view: some screens show more pictures a second than the server takes. */
 const MIN_FLUSH_INTERVAL_MS = 8;
+/** Maximum size of a message before the server has said its own limit. */
+const MAX_HELLO_BYTES = 262_144;
 /** Requests for what the view shows: they are sent once all changes before them have taken effect. */
 const VIEW_REQUESTS = ['export', 'save', 'movie', 'points'];
 
@@ -34,8 +36,10 @@ export class Viewer {
   sceneChanged = signal();
   /** Emits when settings or the camera are changed here, not by the server. */
   changedByUser = signal();
-  /** Emits before the server replaces scene and camera, by those of a scene file or of other data. */
+  /** Emits before scene and camera are replaced by those of a link, an earlier state, a scene file or other data. */
   viewReplaced = signal();
+  /** Emits the measurements of a scene file that the user has chosen. */
+  measurementsLoaded = signal();
   cameraChanged = signal();
   frameShown = signal();
   toolChanged = signal();
@@ -88,6 +92,11 @@ export class Viewer {
   /** The added files that are shown. */
   get addedObjects() {
     return (this.scene?.added_files ?? []).map((id) => this.addedFiles.get(id)).filter(Boolean);
+  }
+
+  /** The measurements of the scene as the server was started with. */
+  get initialMeasurements() {
+    return this.initialScene.measurements ?? [];
   }
 
   /** All files and objects. */
@@ -154,11 +163,16 @@ export class Viewer {
 
   /** Lets the scene's animation move the camera again. */
   resumeAnimation() {
-    this.showLink({ ...viewPatch(this.initialScene, this.currentScene()), camera: {} });
+    this.#showPatch({ ...viewPatch(this.initialScene, this.currentScene()), camera: {} });
   }
 
   /** Shows the initial scene with `patch` applied. */
   showLink(patch) {
+    this.viewReplaced();
+    this.#showPatch(patch);
+  }
+
+  #showPatch(patch) {
     const target = mergePatch(this.initialScene, patch);
     this.scene = this.currentScene();
     if (this.info.camera_moves && !target.camera.lock) {
@@ -184,7 +198,7 @@ export class Viewer {
 
   /** Sends a scene file to the server, which shows its settings or rejects it. */
   async loadScene(file) {
-    const maxBytes = this.info?.limits.max_message_bytes;
+    const maxBytes = this.#maxMessageBytes;
     // A large file dropped by mistake is not even read.
     const text = maxBytes < file.size ? null : await file.text();
     const message = { type: 'loadScene', id: ++this.#lastRequestId, name: file.name, text };
@@ -238,13 +252,24 @@ export class Viewer {
     // Those that were cancelled meanwhile are answered already.
     for (const message of this.#waitingRequests.splice(0).filter(({ id }) => this.#requests.has(id))) {
       if (!isReady && VIEW_REQUESTS.includes(message.type)) this.#waitingRequests.push(message);
+      else if (this.#maxMessageBytes < byteLength(message)) this.#rejectRequest(message.id, 'the request is too long for the server');
       else if (!this.#connection.send(message)) this.#rejectRequest(message.id, 'there is no connection');
     }
   }
 
   #sendHello() {
     // A link applies to any data, the state of this page to those that it shows.
-    this.#connection.send({ type: 'hello', ...this.size, scene: this.#helloPatch, name: this.info?.name });
+    const hello = () => ({ type: 'hello', ...this.size, scene: this.#helloPatch, name: this.info?.name });
+    // The server ends a connection that sends more, again and again.
+    if (this.#maxMessageBytes < byteLength(hello())) {
+      this.#helloPatch = {};
+      this.rejected({ text: 'The link is too long for the server: its settings are left out.' });
+    }
+    this.#connection.send(hello());
+  }
+
+  get #maxMessageBytes() {
+    return this.info?.limits.max_message_bytes ?? MAX_HELLO_BYTES;
   }
 
   #scheduleFlush() {
@@ -261,18 +286,27 @@ export class Viewer {
 
   #flush() {
     if (!this.isConnected) return;
-    if (this.#queuedPatch) {
-      const { patch, isMoving } = this.#queuedPatch;
-      this.#queuedPatch = null;
-      this.#send({ type: 'set', scene: patch, moving: isMoving });
-      this.#pendingPatches.push({ seq: this.#seq, patch });
-    }
+    if (this.#queuedPatch) this.#sendPatch();
     if (this.#queuedCamera) {
       this.#send({ type: 'camera', camera: this.#queuedCamera, moving: this.#isMoving });
       this.#queuedCamera = null;
       this.#lastCameraSeq = this.#seq;
     }
     this.#sendRequests();
+  }
+
+  #sendPatch() {
+    const { patch, isMoving } = this.#queuedPatch;
+    this.#queuedPatch = null;
+    const message = { type: 'set', scene: patch, moving: isMoving, seq: this.#seq + 1 };
+    if (byteLength(message) <= this.#maxMessageBytes) {
+      this.#send(message);
+      this.#pendingPatches.push({ seq: this.#seq, patch });
+      return;
+    }
+    this.#applyPendingPatches();
+    this.sceneChanged();
+    this.rejected({ text: 'These settings are too long for the server.' });
   }
 
   #send(message) {
@@ -337,6 +371,7 @@ export class Viewer {
 
   #receiveScene({ number, id, seq, scene, camera, legend }) {
     this.legend = legend;
+    const { measurements } = this.#confirmedScene;
     this.#confirmedScene = scene;
     this.#sceneNumber = number;
     this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
@@ -351,6 +386,7 @@ export class Viewer {
     if (id !== undefined) {
       // The user has chosen a scene file, and can undo it.
       if (id === this.#loadId) this.#loadId = null;
+      if (!areEqual(measurements, scene.measurements)) this.measurementsLoaded(scene.measurements ?? []);
       this.changedByUser();
     }
     this.sceneChanged();

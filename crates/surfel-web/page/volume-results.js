@@ -1,10 +1,4 @@
-// Volumes of polygons over a base plane: what they are made of, and their results.
-
-/** Whether the base and cell size of a volume from a link are valid. */
-export function isVolume({ base, cell_size }) {
-  const isBase = base === 'lowest' || base === 'mean' || Number.isFinite(base);
-  return isBase && (cell_size === undefined || (Number.isFinite(cell_size) && 0 < cell_size));
-}
+// Results of volumes of polygons over a base plane.
 
 /** The results of a volume as rows of name, value and dimension; none until the server has computed it. */
 export function volumeResults({ volume }) {

@@ -49,7 +49,8 @@ pub use frame_ancestors::FrameAncestors;
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
     AddedFile, Error, Export, MovieRequest, PickedPoint, PictureOverlay, PicturePart,
-    PointDescriber, PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
+    PointDescriber, PointLocator, PreparedScene, Result, SceneProvider, SentFile, SettingsMap,
+    WrittenFile,
 };
 pub use server::Server;
 pub use tls::{TlsError, TlsIdentity};

@@ -58,7 +58,7 @@ pub enum Incoming {
     /// Cancels a `Save`, `Points`, `Movie` or `AddFile`.
     Cancel { id: u32 },
     /// A request for the settings as command line and scene files.
-    Export { id: u32, width: u32, height: u32 },
+    Export { id: u32, width: u32, height: u32, measurements: Option<Value> },
     /// The text of a scene file whose settings are to be shown.
     LoadScene { id: u32, name: String, text: String },
 }

@@ -171,6 +171,7 @@ mod tests {
     //! The page is bundled, and its keys choose colours that there are.
 
     use super::*;
+    use crate::limits::Limits;
     use surfel_core::scene::color::ColorSource;
 
     #[test]
@@ -186,6 +187,16 @@ mod tests {
             let is_named = page.contains(&format!("\"{name}\""));
             assert!(is_named || script.contains(&format!("import('./{name}')")), "{name}");
         }
+    }
+
+    #[test]
+    fn the_page_knows_how_long_its_first_message_may_be() {
+        let script = Embedded::get("viewer.js").unwrap().data;
+        let script = std::str::from_utf8(&script).unwrap();
+        let (_, rest) = script.split_once("MAX_HELLO_BYTES = ").unwrap();
+        let (number, _) = rest.split_once(';').unwrap();
+        let max_bytes: usize = number.replace('_', "").parse().unwrap();
+        assert_eq!(max_bytes, Limits::default().max_message_bytes);
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use crate::corners;
 use crate::scene_provider::{Error, PreparedScene, Result};
 use serde_json::{Value, json};
-use surfel_core::flat::{Profile, ProfileLine, ProfilePoint, height_profile};
+use surfel_core::flat::{PointId, Profile, ProfileLine, ProfilePoint, height_profile};
+use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 
 /// Maximum number of points that a page gets.
@@ -33,20 +34,33 @@ pub fn profile(
     progress: &dyn Progress,
 ) -> Result<Value> {
     let Profile { points, n_found } = height_profile(&scene.flat, line, MAX_POINTS, progress)?;
-    let numbers = |number: fn(&ProfilePoint) -> f64| {
-        points.iter().map(number).map(rounded).collect::<Vec<f64>>()
-    };
+    let ids: Vec<PointId> = points.iter().map(|point| point.id).collect();
+    let exact = (scene.locate)(&scene.flat, &ids);
+    let positions: Vec<[f64; 3]> = points
+        .iter()
+        .zip(exact)
+        .map(|(point, exact)| exact.unwrap_or(point.position.to_array()).map(rounded))
+        .collect();
+    let heights = positions.iter().map(|position| rounded(line.up.dot(DVec3::from(*position))));
+    let numbers =
+        |number: fn(&ProfilePoint) -> f64| points.iter().map(number).map(short).collect::<Vec<_>>();
     Ok(json!({
         "n_found": n_found,
         "distances": numbers(|point| point.distance),
         "offsets": numbers(|point| point.offset),
-        "heights": numbers(|point| point.height),
+        "heights": heights.collect::<Vec<f64>>(),
+        "positions": positions,
         "colors": points.iter().map(|point| point.color).collect::<Vec<_>>(),
     }))
 }
 
-/// Rounds to nine digits, more than the f32 offsets of points hold.
+/// Rounds to twelve digits: micrometres on a national grid, without the rounding errors of sums.
 fn rounded(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
+/// Rounds to nine digits, more than the f32 offsets of points hold.
+fn short(value: f64) -> f64 {
     format!("{value:.8e}").parse().unwrap_or(value)
 }
 
@@ -55,7 +69,6 @@ mod tests {
     //! Valid and invalid lines.
 
     use super::*;
-    use surfel_core::math::DVec3;
 
     #[test]
     fn lines_are_checked() {

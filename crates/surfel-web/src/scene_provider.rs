@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 use std::io::Read;
 use std::sync::Arc;
-use surfel_core::flat::FlatScene;
+use surfel_core::flat::{FlatScene, PointId};
 use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::progress::Progress;
@@ -172,6 +172,10 @@ pub trait WrittenFile: Send + Sync {
 /// Returns facts about a picked point of a flat scene, as the page shows them.
 pub type PointDescriber = Arc<dyn Fn(&FlatScene, &PickedPoint) -> Value + Send + Sync>;
 
+/// Returns the positions of points of a flat scene as exact as their files have them, in world coordinates; none for
+/// points that are deformed.
+pub type PointLocator = Arc<dyn Fn(&FlatScene, &[PointId]) -> Vec<Option<[f64; 3]>> + Send + Sync>;
+
 /// Draws a scene's legend, scale bar, north arrow and caption onto its pictures.
 pub trait PictureOverlay: Send + Sync {
     /// Draws onto a picture at rest.
@@ -216,6 +220,8 @@ pub struct PreparedScene {
     pub overlay: Option<Box<dyn PictureOverlay>>,
     /// Describes picked points.
     pub describe: PointDescriber,
+    /// Finds exact positions of points.
+    pub locate: PointLocator,
 }
 
 /// The point at which the ray through a pixel hits a surface.

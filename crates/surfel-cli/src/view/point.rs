@@ -4,10 +4,11 @@ use super::coordinates::{coordinates, shortest};
 use serde_json::{Value, json};
 use surfel::live_view::SceneTrees;
 use surfel::resolve::LoadedScene;
-use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::flat::{FlatGeometry, FlatScene, Instance, PointId};
 use surfel_core::math::DAffine3;
 use surfel_core::points::{COLOR_8_TO_16, PointCloud, Values, have_8_bits};
 use surfel_core::scene::{Geometry, Graph};
+use surfel_formats::FileInfo;
 use surfel_web::PickedPoint;
 
 /// Returns the picked point or triangle with all columns of its file. `flat` and `graph` are those of `trees` at the
@@ -33,26 +34,74 @@ pub fn describe(
         FlatGeometry::Mesh(_) => json!("triangle"),
     };
     facts["object"] = json!(name(graph, instance.node_idx as usize));
-    let geometry = instance.graph_geometry_idx as usize;
-    let index = trees.source_indices[geometry].get(picked.primitive_idx as usize);
-    let source = loaded.graph.geometries.get(geometry).zip(index);
-    let Some((Geometry::Points(cloud), &index)) = source else { return facts };
-    let index = index as usize;
+    let Some((cloud, index)) = source(loaded, trees, instance, picked.primitive_idx) else {
+        return facts;
+    };
     facts["index"] = json!(index);
-    // A deformed point is where it was hit.
-    if cloud.morphs.is_empty() && cloud.skin.is_none() {
-        let world = graph.world_from_nodes()[instance.node_idx as usize];
-        let in_file = coordinates(cloud, index, &loaded.file_info());
-        if world == DAffine3::IDENTITY {
-            facts["position"] = json!(in_file.map(|coordinate| coordinate.value));
-            facts["decimals"] = json!(in_file.map(|coordinate| coordinate.decimals));
-        } else {
-            let moved = world.transform_point3(cloud.world_position(index));
-            facts["position"] = json!(moved.to_array());
+    let world = graph.world_from_nodes()[instance.node_idx as usize];
+    if let Some((position, decimals)) = position(cloud, index, &world, &loaded.file_info()) {
+        facts["position"] = json!(position);
+        if let Some(decimals) = decimals {
+            facts["decimals"] = json!(decimals);
         }
     }
     facts["columns"] = columns(cloud, index).into();
     facts
+}
+
+/// Returns the positions of points as exact as their files have them, in world coordinates; none for deformed ones.
+pub fn locate(
+    loaded: &LoadedScene,
+    trees: &SceneTrees,
+    flat: &FlatScene,
+    graph: &Graph,
+    points: &[PointId],
+) -> Vec<Option<[f64; 3]>> {
+    let (info, world_from_nodes) = (loaded.file_info(), graph.world_from_nodes());
+    let located = points.iter().map(|point| {
+        let instance = flat.instances.get(point.instance_idx as usize)?;
+        let (cloud, index) = source(loaded, trees, instance, point.primitive_idx)?;
+        let world = &world_from_nodes[instance.node_idx as usize];
+        position(cloud, index, world, &info).map(|(position, _)| position)
+    });
+    located.collect()
+}
+
+/// Returns the cloud as it was read in which a point of an instance is, and its index there.
+fn source<'l>(
+    loaded: &'l LoadedScene,
+    trees: &SceneTrees,
+    instance: &Instance,
+    primitive_idx: u32,
+) -> Option<(&'l PointCloud, usize)> {
+    let geometry = instance.graph_geometry_idx as usize;
+    let index = *trees.source_indices[geometry].get(primitive_idx as usize)?;
+    match loaded.graph.geometries.get(geometry)? {
+        Geometry::Points(cloud) => Some((cloud, index as usize)),
+        Geometry::Triangles(_) => None,
+    }
+}
+
+/// Returns the world position of a point of a cloud, and the decimals of its coordinates where the file is not moved;
+/// none for a deformed point, which is where it was hit.
+fn position(
+    cloud: &PointCloud,
+    index: usize,
+    world_from_cloud: &DAffine3,
+    info: &FileInfo,
+) -> Option<([f64; 3], Option<[Option<usize>; 3]>)> {
+    if !cloud.morphs.is_empty() || cloud.skin.is_some() {
+        return None;
+    }
+    if *world_from_cloud != DAffine3::IDENTITY {
+        let moved = world_from_cloud.transform_point3(cloud.world_position(index));
+        return Some((moved.to_array(), None));
+    }
+    let in_file = coordinates(cloud, index, info);
+    Some((
+        in_file.map(|coordinate| coordinate.value),
+        Some(in_file.map(|coordinate| coordinate.decimals)),
+    ))
 }
 
 /// Returns the nearest name at a node or above it.

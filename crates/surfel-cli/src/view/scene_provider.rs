@@ -12,7 +12,7 @@ use super::histogram::histogram;
 use super::legend::legend_json;
 use super::page_overlay::page_overlay;
 use super::page_settings::{self, Content};
-use super::point::describe;
+use super::point::{describe, locate};
 use super::rejection::rejection;
 use super::rows::{Rows, bounds_json, name_by_rows};
 use super::shown_points::write_shown_points;
@@ -28,17 +28,18 @@ use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
 use surfel::file_names::{file_name, list_files};
 use surfel::live_scene::{LiveScene, UseCase};
-use surfel::live_view::LiveView;
+use surfel::live_view::{LiveView, SceneTrees};
 use surfel::overlay;
+use surfel_core::flat::PointId;
 use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::{NoProgress, Progress};
-use surfel_core::scene::Material;
 use surfel_core::scene::color::ColorSource;
+use surfel_core::scene::{Graph, Material};
 use surfel_web::{
-    AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PreparedScene,
-    Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
+    AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PointLocator,
+    PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
 /// The scenes of one set of files.
@@ -129,7 +130,8 @@ impl FileSceneProvider {
                 && description.picture.spp() == SceneDescription::default().picture.spp(),
             legend: legend_json(&view.trees.legend),
             overlay: page_overlay(view.overlay()),
-            describe: self.describer(&view, description.output.time()),
+            describe: describer(&view, description.output.time()),
+            locate: locator(&view, description.output.time()),
             settings: complete_settings(
                 view.description,
                 &description,
@@ -207,17 +209,30 @@ impl FileSceneProvider {
         names.extend(ColorSource::names_where(ColorSource::is_computed));
         names
     }
+}
 
-    fn describer(&self, view: &LiveView, time_secs: f64) -> PointDescriber {
-        let (loaded, trees) = (view.loaded.clone(), view.trees.clone());
-        Arc::new(move |flat, picked: &PickedPoint| {
-            let mut graph = Cow::Borrowed(&trees.graph);
-            if !graph.animation.channels.is_empty() {
-                graph.to_mut().evaluate_at(time_secs);
-            }
-            describe(&loaded, &trees, flat, &graph, picked)
-        })
+/// Describes the points of a view at a time.
+fn describer(view: &LiveView, time_secs: f64) -> PointDescriber {
+    let (loaded, trees) = (view.loaded.clone(), view.trees.clone());
+    Arc::new(move |flat, picked: &PickedPoint| {
+        describe(&loaded, &trees, flat, &graph_at(&trees, time_secs), picked)
+    })
+}
+
+/// Finds the points of a view at a time.
+fn locator(view: &LiveView, time_secs: f64) -> PointLocator {
+    let (loaded, trees) = (view.loaded.clone(), view.trees.clone());
+    Arc::new(move |flat, points: &[PointId]| {
+        locate(&loaded, &trees, flat, &graph_at(&trees, time_secs), points)
+    })
+}
+
+fn graph_at(trees: &SceneTrees, time_secs: f64) -> Cow<'_, Graph> {
+    let mut graph = Cow::Borrowed(&trees.graph);
+    if !graph.animation.channels.is_empty() {
+        graph.to_mut().evaluate_at(time_secs);
     }
+    graph
 }
 
 /// Returns the settings of a complete description as a page sees them. `source` stands for colours that are left open.

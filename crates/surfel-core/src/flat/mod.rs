@@ -36,4 +36,5 @@ pub use punctual_light::FlatPunctualLight;
 pub use refit::{MAX_COST_RATIO, Refit};
 pub use scene::{FlatGeometry, FlatScene};
 pub use triangles::{FlatTriangles, TriangleBlock};
+pub use visit_points::PointId;
 pub use volume::{BaseHeight, Volume, VolumeQuery, cut_and_fill};

@@ -1,7 +1,7 @@
 //! Height profiles: the points beside a line over the ground, by their distance along it and their height.
 
 use super::FlatScene;
-use super::visit_points::{VisitedPoint, visit_points};
+use super::visit_points::{PointId, VisitedPoint, visit_points};
 use crate::error::Result;
 use crate::math::{DVec3, hash};
 use crate::progress::Progress;
@@ -20,6 +20,10 @@ pub struct ProfileLine {
 /// A point of a profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfilePoint {
+    /// The point in its cloud.
+    pub id: PointId,
+    /// Position in world coordinates, as blocks of points hold it.
+    pub position: DVec3,
     /// Distance from the first corner along the level line.
     pub distance: f64,
     /// Level distance from the line, positive on its left side.
@@ -120,6 +124,8 @@ fn point_in_strip(
         let is_in_strip =
             (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;
         is_in_strip.then(|| ProfilePoint {
+            id: point.id,
+            position: point.position,
             distance: segment.distance + along,
             offset,
             height: line.up.dot(point.position),

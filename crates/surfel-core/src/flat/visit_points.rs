@@ -13,9 +13,20 @@ const SLOTS_PER_PART: usize = 8192;
 /// Number of tasks whose results are held at once.
 const MAX_PARTS_AT_ONCE: usize = 64;
 
+/// Names a point of a flat scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointId {
+    /// Index of the instance in the flat scene.
+    pub instance_idx: u32,
+    /// Index of the point in its cloud.
+    pub primitive_idx: u32,
+}
+
 /// A visible point of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct VisitedPoint {
+    /// The point in its cloud.
+    pub id: PointId,
     /// Position in world coordinates.
     pub position: DVec3,
     /// Colour as sRGB.
@@ -95,7 +106,8 @@ pub fn visit_points_in_turn<T: Send>(
                 let position = scene.origin + instance.world_position(center).as_dvec3();
                 let is_hidden = scene.camera_planes.iter().any(|plane| plane.hides(position));
                 let key = ((trees.len() * instance_idx + tree_idx) as u64) << 40 | slot as u64;
-                (!is_hidden).then_some(VisitedPoint { position, color, key })
+                let id = PointId { instance_idx: instance_idx as u32, primitive_idx: ids[slot] };
+                (!is_hidden).then_some(VisitedPoint { id, position, color, key })
             };
             let visit_part = |part: usize| {
                 progress.check()?;

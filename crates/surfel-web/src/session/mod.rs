@@ -198,7 +198,9 @@ impl Session {
                 self.add_file(Announcement { id, name, n_bytes }).await;
             }
             Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
-            Incoming::Export { id, width, height } => self.export(id, width, height).await,
+            Incoming::Export { id, width, height, measurements } => {
+                self.export(id, (width, height), measurements).await
+            }
             Incoming::LoadScene { id, name, text } => self.load_scene(id, name, text).await,
         }
     }
@@ -385,12 +387,15 @@ impl Session {
         });
     }
 
-    async fn export(&self, id: u32, width: u32, height: u32) {
+    async fn export(&self, id: u32, (width, height): (u32, u32), measurements: Option<Value>) {
         let provider = self.state.provider.borrow().clone();
-        let Some((settings, provider)) = self.settings(width, height).zip(provider) else {
+        let Some((mut settings, provider)) = self.settings(width, height).zip(provider) else {
             let error = Error::invalid_request("there is nothing to export yet");
             return self.reject(RequestRef::Id(id), &error).await;
         };
+        if let Some(measurements) = measurements {
+            settings.insert("measurements".into(), measurements);
+        }
         let export = move || provider.export(&provider.drawable_settings(&settings));
         let export = self.state.run_blocking(export).await;
         let message = match export.flatten() {

@@ -278,6 +278,7 @@ impl SceneProvider for HillProvider {
             describe: Arc::new(
                 |_, point| json!({ "index": point.primitive_idx, "position": point.position.to_array() }),
             ),
+            locate: Arc::new(|_, points| vec![None; points.len()]),
         })
     }
 

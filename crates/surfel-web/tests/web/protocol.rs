@@ -135,6 +135,9 @@ async fn profiles_have_the_points_beside_their_line() {
         let height = 0.5 * (-2.0 * x * x).exp();
         assert!((numbers("heights", i) - height).abs() < 1e-5, "{i}");
         assert!(numbers("offsets", i).abs() < 1e-5 && profile["colors"][i].is_array());
+        let position = &profile["positions"][i];
+        assert!((position[0].as_f64().unwrap() - x).abs() < 1e-5, "{position}");
+        assert_eq!(position[2], profile["heights"][i]);
     }
     for invalid in [json!([]), json!([[0, 0, 0]])] {
         page.send_json(request(2, invalid)).await;

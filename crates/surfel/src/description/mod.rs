@@ -16,6 +16,7 @@ mod keys;
 mod lamp;
 mod light;
 mod material;
+mod measurement;
 mod named_view;
 mod spelling;
 mod object;
@@ -42,6 +43,7 @@ pub use keys::{Key, KeyedSettings};
 pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
+pub use measurement::{Measurement, MeasurementKind};
 pub use named_view::{NamedView, ViewSettings};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
@@ -102,7 +104,7 @@ pub struct SceneDescription {
     pub materials: MaterialSettings,
     /// Settings of files and objects by their names.
     pub overrides: OverrideSettings,
-    /// Views that were saved under names.
+    /// Views that were saved under names, and measurements.
     pub views: ViewSettings,
 }
 

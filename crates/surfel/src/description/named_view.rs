@@ -1,6 +1,7 @@
-//! Views of a scene that were saved under names.
+//! Views of a scene that were saved under names, and the measurements of the viewer.
 
 use super::keys::settings;
+use super::measurement::{Measurement, Measurements};
 use super::rule::Rule;
 use super::{CameraSettings, Invalid, OrthographicHeight, read_table, write_table};
 use serde_json::{Map, Value, json};
@@ -8,10 +9,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 settings! {
-    /// Saved views.
+    /// Saved views and measurements.
     pub struct ViewSettings {
         /// Views to which the viewer goes by their names. They change no picture.
         views: Vec<NamedView>, NamedViews, "VIEWS";
+        /// Measurements and annotations that the viewer shows. They change no picture.
+        measurements: Vec<Measurement>, Measurements, "MEASUREMENTS";
     }
 }
 

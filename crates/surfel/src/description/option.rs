@@ -20,7 +20,7 @@ pub fn is_list(path: &str) -> bool {
 
 /// Returns true for the keys that are options too; some are for scene files and pages alone.
 pub fn has_option(path: &str) -> bool {
-    path != "views"
+    !["views", "measurements"].contains(&path)
 }
 
 /// Writes a value as it is typed.
