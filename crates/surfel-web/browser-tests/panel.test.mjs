@@ -325,7 +325,7 @@ test('the classes of the legend hide and show their points', async () => {
 });
 
 test('numbers beyond their limits are rejected with the limits, others beyond the slider are taken', async () => {
-  for (const [key, typed, reason] of [['spp', 99999, /at most 1024/], ['sun.elevation', 500, /from -90 to 90/], ['camera.view_angle', 175, /from 1 to 170/]]) {
+  for (const [key, typed, reason] of [['spp', 5000, /at most 1024/], ['sun.elevation', 500, /from -90 to 90/], ['camera.view_angle', 175, /from 1 to 170/]]) {
     const number = page.locator(`[data-number="${key}"]`);
     const before = await number.inputValue();
     await number.fill(String(typed));
@@ -337,8 +337,8 @@ test('numbers beyond their limits are rejected with the limits, others beyond th
     await page.waitForFunction(([name, value]) => document.querySelector(`[data-number="${name}"]`).value === value, [key, before]);
   }
   const radius = page.locator('[data-number="radius_scale"]');
-  await radius.fill('200');
+  await radius.fill('0.001');
   await radius.press('Enter');
-  await page.waitForFunction(() => window.surfel.state.scene.radius_scale === 200);
+  await page.waitForFunction(() => window.surfel.state.scene.radius_scale === 0.001);
   await resetControl('radius_scale');
 });

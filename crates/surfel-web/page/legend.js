@@ -19,8 +19,8 @@ export function setUpLegend(viewer) {
     shown = [legend, classes];
     card.hidden = !legend;
     if (!legend) return;
-    const focused = card.querySelector(':focus-visible')?.dataset.class;
-    const content = legend.kind === 'map' ? mapScale(legend) : classes ? classSwitches(legend, classes, viewer) : labelList(legend);
+    const focused = card.querySelector(':focus')?.dataset.class;
+    const content = legend.kind === 'map' ? mapScale(legend) : classes ? classSwitches(classes, viewer) : labelList(legend);
     card.replaceChildren(element('h2', {}, legend.title), content);
     card.querySelector(`[data-class="${focused}"]`)?.focus();
   });
@@ -42,11 +42,10 @@ function labelList({ entries }) {
   return element('ul', { class: 'legend-classes' }, ...entries.map(({ name, color }) => element('li', {}, swatchOf(color), name)));
 }
 
-/** The classes of a legend, and those that are hidden, as buttons that hide and show them. The last one stays. */
-function classSwitches({ entries }, shown, viewer) {
+/** All classes as buttons that hide and show them, also those that the legend of the server lacks as they are hidden. The last one stays. */
+function classSwitches(shown, viewer) {
   const all = viewer.info.classes;
-  const listed = all.filter((one) => !shown.includes(one.class) || entries.some((entry) => entry.class === one.class));
-  return element('ul', { class: 'legend-classes' }, ...listed.map(({ class: number, name, color }) => {
+  return element('ul', { class: 'legend-classes' }, ...all.map(({ class: number, name, color }) => {
     const isShown = shown.includes(number);
     const toggle = () => {
       const classes = all.map((one) => one.class).filter((other) => (other === number ? !isShown : shown.includes(other)));
