@@ -5,7 +5,8 @@ import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { before, test } from 'node:test';
-import { closePage, openPage, pixelAt, QUICK, serve, settled, show, unfoldPanel } from './harness.mjs';
+import { encodeHash } from '../page/link.js';
+import { closePage, data, openPage, pixelAt, QUICK, serve, settled, show, unfoldPanel } from './harness.mjs';
 
 const AXE = createRequire(join(process.env.PLAYWRIGHT ?? import.meta.dirname, 'x.js')).resolve('axe-core/axe.min.js');
 const axeSource = readFileSync(AXE, 'utf8');
@@ -29,6 +30,38 @@ async function violations(page) {
   await page.evaluate(axeSource);
   const { violations: found } = await page.evaluate(() => window.axe.run(document, { resultTypes: ['violations'] }));
   return found.flatMap(({ id, nodes }) => nodes.map((node) => `${id}: ${node.target.join(' ')} ${node.any[0]?.message ?? ''}`));
+}
+
+const LINE = [data.points[0], data.points.at(-1)].map(({ x, y, z }) => [x, y, z]);
+const FIGURES = [{ kind: 'profile', name: 'profile 1', points: LINE, width: 1 }, { kind: 'volume', name: 'volume 2', points: [...LINE, [LINE[0][0], LINE[1][1], 148]], base: 'lowest' }];
+const LEGENDS = { classes: { color: 'class', class: [2] }, map: { color: 'elevation' }, drawn: { color: 'elevation', legend: true } };
+
+for (const [name, options] of Object.entries(SITUATIONS)) {
+  test(`axe finds no violations in legends, cards and charts: ${name}`, async () => {
+    const page = await openPage(server.link, options);
+    const found = [];
+    const look = async (part) => found.push(...(await violations(page)).map((text) => `${part}: ${text}`));
+    for (const [legend, patch] of Object.entries(LEGENDS)) {
+      await show(page, patch);
+      await look(legend);
+    }
+    await page.goto('about:blank');
+    await page.goto(server.link + encodeHash({}, FIGURES));
+    await settled(page);
+    await page.locator('#measure-card').waitFor();
+    await look('measurements');
+    await page.locator('[aria-label="Show profile 1"]').click();
+    await page.locator('#profile-card .note:not(:empty)').waitFor();
+    await look('chart');
+    await page.locator('#profile-card [aria-label="Close"]').click();
+    // The server's answer, which ends the adding, is held back.
+    await page.evaluate(() => { XMLHttpRequest.prototype.send = () => {}; });
+    await page.setInputFiles('#scene-file', { name: 'new.xyz', mimeType: 'text/plain', buffer: Buffer.from('1 2 3') });
+    await page.locator('#added-card').waitFor();
+    await look('added files');
+    assert.deepEqual([...new Set(found)], []);
+    await closePage(page);
+  });
 }
 
 const DIALOGS = { save: '#save-cancel', export: '#export-close', help: '#help-close' };

@@ -206,3 +206,18 @@ test('two files of one name have rows of their own', async () => {
   assert.deepEqual((await state(other, 'scene')).object_settings, ['part.obj:visible=false', 'part (2).obj:visible=false']);
   await closePage(other);
 });
+
+test('profiles and volumes wait for points', async () => {
+  const own = await serve(['house.obj'], ...QUICK);
+  const meshes = await openPage(own.link);
+  const tools = ['profile', 'volume'].map((tool) => meshes.locator(`#toolbar [data-tool="${tool}"]`));
+  for (const tool of tools) {
+    assert.ok(await tool.isDisabled());
+    assert.match(await tool.getAttribute('title'), /needs points/);
+  }
+  assert.ok(await meshes.locator('#toolbar [data-tool="distance"]').isEnabled());
+  await drop(meshes, [['roof.xyz', ROOF]]);
+  await meshes.waitForFunction(() => !document.querySelector('#toolbar [data-tool="volume"]').disabled);
+  assert.doesNotMatch(await tools[0].getAttribute('title'), /needs/);
+  await closePage(meshes);
+});

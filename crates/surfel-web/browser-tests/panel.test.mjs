@@ -306,3 +306,39 @@ test('the legend shows the colours', async () => {
   await resetControl('color');
   assert.ok(await page.locator('#legend').isHidden());
 });
+
+test('the classes of the legend hide and show their points', async () => {
+  await setControl('color', 'class');
+  const [ground, building] = ['2', '6'].map((number) => page.locator(`#legend [data-class="${number}"]`));
+  const shown = await finishedPixels(page);
+  await building.click();
+  await page.waitForFunction(() => window.surfel.state.scene.class?.join() === '2');
+  assert.notEqual(await finishedPixels(page), shown);
+  assert.deepEqual([await building.getAttribute('aria-pressed'), await ground.isDisabled()], ['false', true]);
+  assert.ok(!(await page.locator('[data-key="class.6"]').isChecked()), 'the list shows the same');
+  await building.focus();
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => !window.surfel.state.scene.class);
+  assert.equal(await finishedPixels(page), shown);
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.class), '6');
+  await resetControl('color');
+});
+
+test('numbers beyond their limits are rejected with the limits, others beyond the slider are taken', async () => {
+  for (const [key, typed, reason] of [['spp', 5000, /at most 1024/], ['sun.elevation', 500, /from -90 to 90/], ['camera.view_angle', 175, /from 1 to 170/]]) {
+    const number = page.locator(`[data-number="${key}"]`);
+    const before = await number.inputValue();
+    await number.fill(String(typed));
+    await number.press('Enter');
+    const error = page.locator(`[data-row="${key}"] .row-error`);
+    await error.waitFor();
+    assert.match(await error.textContent(), reason);
+    await number.blur();
+    await page.waitForFunction(([name, value]) => document.querySelector(`[data-number="${name}"]`).value === value, [key, before]);
+  }
+  const radius = page.locator('[data-number="radius_scale"]');
+  await radius.fill('0.001');
+  await radius.press('Enter');
+  await page.waitForFunction(() => window.surfel.state.scene.radius_scale === 0.001);
+  await resetControl('radius_scale');
+});

@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { filterName, histogramRows, rangeIn, rangeOf, withRange } from '../page/histogram.js';
+import { filterName, rangeIn, rangeOf, withRange } from '../page/histogram.js';
+import { histogramRows } from '../page/histogram-choice.js';
 import { signal } from '../page/signal.js';
 import { fakeDocument } from './fake-dom.mjs';
 

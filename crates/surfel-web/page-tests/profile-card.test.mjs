@@ -52,6 +52,18 @@ test('a changed width waits for its own answer', async () => {
   assert.deepEqual(areEnabled(), [false, false]);
 });
 
+test('a width that is not positive is taken back with a reason', async () => {
+  const { card, answers } = openCard();
+  card.open(first);
+  answers[0]();
+  await settled();
+  const [width] = card.card.all('input');
+  [width.value, width.valueAsNumber] = ['-5', -5];
+  width.emit('change');
+  assert.equal(width.value, 1);
+  assert.match(card.readout.textContent, /positive/);
+});
+
 test('a card that was closed is opened without the old chart', async () => {
   const { card, answers } = openCard();
   card.open(first);

@@ -1,4 +1,5 @@
-// The table of controls: each scene-file key that the panel shows, with its label, kind and range.
+// The table of controls: each scene-file key that the panel shows, with its label, kind and range. Numbers beyond the
+// range of a slider can be typed; the server rejects those that it does not take.
 
 import * as clip from './clip.js';
 import { areEqual } from './merge-patch.js';
@@ -18,21 +19,21 @@ const APART = ['points', 'sphere', 'gaussian'];
 
 export const surfaceControls = [
   { key: 'surface', label: 'Kind', kind: 'select', options: ({ info }) => info.surfaces, help: 'Kind of surface' },
-  { key: 'point_size', label: 'Point size', ...SLIDER, range: [1, 16], limits: [1, 64], step: 0.5, unit: ' px', automatic: true,
+  { key: 'point_size', label: 'Point size', ...SLIDER, range: [1, 16], step: 0.5, unit: ' px', automatic: true,
     isVisible: ({ surface }) => surface === 'points', help: 'Diameter of each point in pixels' },
-  { key: 'radius_scale', label: 'Radius', ...SLIDER, range: [0.25, 4], limits: [0.01, 100], scale: 'logarithmic',
+  { key: 'radius_scale', label: 'Radius', ...SLIDER, range: [0.25, 4], scale: 'logarithmic',
     read: (scene) => scene.radius_scale ?? 1, help: 'Factor of the radius of each point' },
-  { key: 'reach', label: 'Reach', ...SLIDER, range: [0.5, 4], limits: [0.25, 8], scale: 'logarithmic', automatic: true,
+  { key: 'reach', label: 'Reach', ...SLIDER, range: [0.5, 4], scale: 'logarithmic', automatic: true,
     isVisible: ({ surface }) => ['cylinder', 'mls', 'splat-fit'].includes(surface), help: 'How far points count, in radii' },
-  { key: 'density', label: 'Density', ...SLIDER, range: [1, 16], limits: [1, 128], step: 1, automatic: true,
+  { key: 'density', label: 'Density', ...SLIDER, range: [1, 16], step: 1, automatic: true,
     isVisible: ({ surface }) => surface === 'cylinder', help: 'Points that a hit needs' },
-  { key: 'degree', label: 'Degree', ...SLIDER, range: [1, 3], limits: [1, 3], step: 1, automatic: true,
+  { key: 'degree', label: 'Degree', ...SLIDER, range: [1, 3], step: 1, automatic: true,
     isVisible: ({ surface }) => surface === 'mls', help: 'Degree of the fitted polynomials' },
   { key: 'align', label: 'Alignment', kind: 'select', isVisible: ({ surface }) => surface === 'splat',
     options: () => ['both', 'nearest', 'each'], read: (scene) => scene.align ?? 'both', help: 'How normals are turned before they are blended' },
   { key: 'gather_limit', label: 'Gather limit', kind: 'select', isVisible: ({ surface }) => BLENDED.includes(surface),
     options: () => ['least', 'nearest'], read: (scene) => scene.gather_limit ?? 'least', help: 'Which disc says how far behind it others are blended' },
-  { key: 'min_distance', label: 'Min distance', ...SLIDER, range: [0, 4], limits: [0, 100], step: 0.01, automatic: true,
+  { key: 'min_distance', label: 'Min distance', ...SLIDER, range: [0, 4], step: 0.01, automatic: true,
     isVisible: ({ surface }) => !APART.includes(surface), help: 'Distance before which new rays ignore hits, in radii' },
   { key: 'edge_test', label: 'Edge test', kind: 'select', help: 'How the edge of the surface is found',
     options: () => [{ value: 'angular-gap', label: 'angular gap' }, { value: 'off', label: 'off' }] },
@@ -52,7 +53,7 @@ export const colorControls = [
   { key: 'range', label: 'Range', kind: 'numbers', names: ['low', 'high'], automatic: true, isVisible: hasMap,
     read: (scene, { legend }) => scene.range ?? (legend?.kind === 'map' ? [legend.low, legend.high] : null),
     write: (range) => ({ range }) },
-  { key: 'gamma', label: 'Gamma', ...SLIDER, range: [0.5, 4], limits: [0.1, 10], scale: 'logarithmic', automatic: true,
+  { key: 'gamma', label: 'Gamma', ...SLIDER, range: [0.5, 4], scale: 'logarithmic', automatic: true,
     isVisible: (scene, viewer) => scene.color === 'rgb' || hasMap(scene, viewer), help: 'Brightens dark colours or values' },
 ];
 
@@ -91,17 +92,17 @@ const hasLight = (name) => (scene) => (scene.light ?? []).includes(name);
 
 export const sunControls = [
   lightControl('sun', 'Sun', 'Gives light and shadows'),
-  { key: 'sun.azimuth', label: 'Azimuth', ...SLIDER, range: [0, 360], limits: [-360, 360], step: 0.1, unit: '°', isVisible: hasLight('sun'), help: 'Clockwise from north' },
-  { key: 'sun.elevation', label: 'Elevation', ...SLIDER, range: [0, 90], limits: [-90, 90], step: 0.1, unit: '°', isVisible: hasLight('sun'), help: 'Above the horizon' },
-  { key: 'sun.angle', label: 'Diameter', ...SLIDER, range: [0, 20], limits: [0, 180], step: 0.01, unit: '°', isVisible: hasLight('sun'), help: 'Angular diameter; 0 gives hard shadows' },
-  { key: 'sun.strength', label: 'Strength', ...SLIDER, range: [0, 4], limits: [0, 1000], step: 0.01, isVisible: hasLight('sun') },
+  { key: 'sun.azimuth', label: 'Azimuth', ...SLIDER, range: [0, 360], step: 0.1, unit: '°', isVisible: hasLight('sun'), help: 'Clockwise from north' },
+  { key: 'sun.elevation', label: 'Elevation', ...SLIDER, range: [0, 90], step: 0.1, unit: '°', isVisible: hasLight('sun'), help: 'Above the horizon' },
+  { key: 'sun.angle', label: 'Diameter', ...SLIDER, range: [0, 20], step: 0.01, unit: '°', isVisible: hasLight('sun'), help: 'Angular diameter; 0 gives hard shadows' },
+  { key: 'sun.strength', label: 'Strength', ...SLIDER, range: [0, 4], step: 0.01, isVisible: hasLight('sun') },
 ];
 
 export const skyControls = [
   lightControl('sky', 'Sky', 'Light from all directions, with ambient occlusion'),
-  { key: 'sky.strength', label: 'Strength', ...SLIDER, range: [0, 4], limits: [0, 1000], step: 0.01, isVisible: hasLight('sky') },
+  { key: 'sky.strength', label: 'Strength', ...SLIDER, range: [0, 4], step: 0.01, isVisible: hasLight('sky') },
   { key: 'sky.ao_distance', label: 'Occlusion', ...SLIDER, scale: 'logarithmic', isVisible: hasLight('sky'), automatic: true,
-    range: ({ info }) => [0.001, 1].map((fraction) => fraction * clip.sizeOf(info.bounds)), limits: [1e-9, 1e12],
+    range: ({ info }) => [0.001, 1].map((fraction) => fraction * clip.sizeOf(info.bounds)),
     help: 'Maximum distance of surfaces that occlude the sky' },
   lightControl('headlight', 'Headlight', 'Light from the camera, without shadows'),
 ];
@@ -120,10 +121,8 @@ const backgroundColors = ({ background }) => {
 };
 const hasBackground = (...kinds) => (scene) => kinds.includes(backgroundKind(scene));
 
-const sampleLimits = ({ info }) => [1, info.limits.max_samples];
-
 export const pictureControls = [
-  { key: 'exposure', label: 'Exposure', ...SLIDER, range: [-5, 5], limits: [-20, 20], step: 0.05, automatic: true, help: 'In stops' },
+  { key: 'exposure', label: 'Exposure', ...SLIDER, range: [-5, 5], step: 0.05, automatic: true, help: 'In stops' },
   { key: 'background', label: 'Background', kind: 'select',
     options: () => [
       { value: 'gradient', label: 'gradient' }, { value: 'color', label: 'one colour' }, { value: 'colors', label: 'two colours' },
@@ -141,9 +140,9 @@ export const pictureControls = [
   { key: 'background.bottom', sceneKey: 'background', label: 'Bottom', kind: 'color', isVisible: hasBackground('colors'),
     read: (scene) => backgroundColors(scene)[1],
     write: (bottom, scene) => ({ background: [backgroundColors(scene)[0], bottom] }) },
-  { key: 'spp', label: 'Samples per pixel', ...SLIDER, range: [1, 256], limits: sampleLimits, scale: 'logarithmic', step: 1, help: 'Camera rays per pixel of the finished picture' },
-  { key: 'light_samples', label: 'Light samples', ...SLIDER, range: [1, 256], limits: sampleLimits, scale: 'logarithmic', step: 1, help: 'Rays per hit toward the sky and a soft sun' },
-  { key: 'max_depth', label: 'Max bounces', ...SLIDER, range: [0, 32], limits: [0, 64], step: 1, help: 'Maximum number of reflections and refractions' },
+  { key: 'spp', label: 'Samples per pixel', ...SLIDER, range: [1, 256], scale: 'logarithmic', step: 1, help: 'Camera rays per pixel of the finished picture' },
+  { key: 'light_samples', label: 'Light samples', ...SLIDER, range: [1, 256], scale: 'logarithmic', step: 1, help: 'Rays per pixel toward the sky, and toward each light with soft shadows' },
+  { key: 'max_depth', label: 'Max bounces', ...SLIDER, range: [0, 32], step: 1, help: 'Maximum number of reflections and refractions' },
 ];
 
 const withoutScale = (_, { camera }) => (camera?.orthographic === undefined ? 'needs orthographic' : '');

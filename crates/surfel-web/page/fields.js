@@ -11,7 +11,7 @@ const SLIDER_STEPS = 1000;
 export const fieldFactories = { slider, select, toggle, color, numbers, text, checklist, button };
 
 function slider(control, change, id) {
-  let [ends, { limits }] = [Array.isArray(control.range) ? control.range : [0, 1], control];
+  let ends = Array.isArray(control.range) ? control.range : [0, 1];
   const range = element('input', { type: 'range', id, min: 0, max: SLIDER_STEPS, step: 1, 'data-key': control.key });
   const number = numberInput(control.label);
   number.dataset.number = control.key;
@@ -24,11 +24,10 @@ function slider(control, change, id) {
   });
   range.addEventListener('change', () => change(value(), false));
   number.addEventListener('change', () => {
-    if (Number.isFinite(number.valueAsNumber)) change(clamp(limits, number.valueAsNumber), false);
+    if (Number.isFinite(number.valueAsNumber)) change(number.valueAsNumber, false);
   });
   const show = (shown, viewer) => {
     if (typeof control.range === 'function') ends = control.range(viewer);
-    if (typeof control.limits === 'function') limits = control.limits(viewer);
     const isNumber = typeof shown === 'number';
     // A value such as `auto` is shown as the placeholder.
     number.placeholder = isNumber ? '' : shown ?? '–';
@@ -54,10 +53,6 @@ function valueOf({ scale }, [low, high], fraction) {
 function rounded(control, value) {
   if (control.step) return Number((Math.round(value / control.step) * control.step).toPrecision(12));
   return Number(value.toPrecision(3));
-}
-
-function clamp([low, high] = [-Infinity, Infinity], value) {
-  return Math.min(high, Math.max(low, value));
 }
 
 function numberInput(label) {

@@ -1,6 +1,6 @@
 // The histogram of a column, with two handles that set the filter.
 
-import { element, icon, svg } from './dom.js';
+import { element, svg } from './dom.js';
 import { shortest } from './format.js';
 
 /** Number of steps in the range of a handle: a little more than a whole one, so that rounding leaves out none. */
@@ -56,30 +56,19 @@ export function rangeOf(handles, { low, high }, step) {
   return [step < 2 * (from - low) ? shortest(from) : null, step < 2 * (high - to) ? shortest(to) : null];
 }
 
-/** The rows of the panel with the choice of the column and its histogram. */
-export function histogramRows(viewer) {
+/** Fills `place` with a chart; returns its `show(column, histogram)`. */
+export function histogramChart(viewer, place) {
   let histogram = null;
-  const column = () => filterName(choice.value);
-  const choice = element('select', { id: 'histogram-column', 'data-key': 'histogram.column', onchange: () => request() });
+  let column = '';
   const bars = svg('svg', { class: 'histogram-bars', preserveAspectRatio: 'none', 'aria-hidden': 'true' });
   const [low, high] = ['Lowest', 'Highest'].map((name) => element('input', {
     type: 'range', class: 'histogram-handle', 'data-handle-name': name, oninput: () => showHandles(), onchange: () => apply(),
   }));
   const readout = element('output', { class: 'note' });
-  const chart = element('div', { class: 'histogram', hidden: true }, element('div', { class: 'histogram-plot' }, bars, low, high), readout);
+  place.append(element('div', { class: 'histogram-plot' }, bars, low, high), readout);
 
-  const request = async () => {
-    const name = choice.value;
-    histogram = null;
-    chart.hidden = true;
-    if (!name) return;
-    const answer = await viewer.request({ type: 'histogram', column: name }).catch((error) => viewer.rejected({ text: error.message }));
-    if (!answer || choice.value !== name) return;
-    ({ histogram } = answer);
-    showHistogram();
-  };
-
-  const showHistogram = () => {
+  const show = (name, found) => {
+    [column, histogram] = [filterName(name), found];
     const { counts, low: least, high: most } = histogram;
     const top = counts.reduce((largest, n) => Math.max(largest, n), 1);
     bars.setAttribute('viewBox', `0 0 ${counts.length} 1`);
@@ -91,16 +80,14 @@ export function histogramRows(viewer) {
     const isWhole = Number.isInteger(least) && Number.isInteger(most) && Number.isInteger(histogram.width);
     for (const handle of [low, high]) {
       Object.assign(handle, { min: least, max: most, step: isWhole ? 1 : (most - least) / N_STEPS || 1 });
-      handle.setAttribute('aria-label', `${handle.dataset.handleName} ${choice.value}`);
+      handle.setAttribute('aria-label', `${handle.dataset.handleName} ${name}`);
     }
-    chart.hidden = false;
     showFilter();
   };
 
   /** Puts the handles where the filter has them. */
   const showFilter = () => {
-    if (!histogram) return;
-    const [from, to] = rangeIn(viewer.scene.filter ?? '', column());
+    const [from, to] = rangeIn(viewer.scene.filter ?? '', column);
     [low.value, high.value] = [from ?? histogram.low, to ?? histogram.high];
     showHandles();
   };
@@ -117,21 +104,9 @@ export function histogramRows(viewer) {
 
   const apply = () => {
     const range = rangeOf([low.valueAsNumber, high.valueAsNumber], histogram, Number(low.step));
-    viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column(), range) || null });
+    viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column, range) || null });
   };
 
-  viewer.infoChanged.listen(() => {
-    const chosen = choice.value;
-    const names = ['', ...viewer.info.columns];
-    choice.replaceChildren(...names.map((name) => element('option', { value: name }, name || 'none')));
-    choice.value = names.includes(chosen) ? chosen : '';
-    request();
-  });
   viewer.sceneChanged.listen(() => { if (viewer.scene) showFilter(); });
-  return [
-    element('div', { class: 'row', 'data-row': 'histogram' },
-      element('label', { for: choice.id, title: 'How many points have which values of a column' }, 'Histogram'),
-      element('div', { class: 'field select' }, choice, icon('chevron'))),
-    chart,
-  ];
+  return show;
 }

@@ -8,7 +8,7 @@ import * as controls from './controls.js';
 import { Crosshair } from './crosshair.js';
 import { CursorCoordinates } from './cursor-coordinates.js';
 import { element } from './dom.js';
-import { histogramRows } from './histogram.js';
+import { histogramRows } from './histogram-choice.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
 import { readLink } from './link.js';

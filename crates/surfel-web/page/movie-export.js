@@ -8,7 +8,7 @@ const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'anim
 /** `sceneFile` is the button beside those of the movie. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
 export function setUpMovieExport(viewer, sceneFile) {
   const number = (label, key, value, max, step = 1) => element('input', { type: 'number', min: 1, max, step, value, 'aria-label': label, 'data-movie': key });
-  const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120, 'any')];
+  const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 240, 'any')];
   const format = element('select', { 'aria-label': 'Format of the movie', 'data-movie': 'format' },
     ...Object.entries(FORMATS).map(([value, label]) => element('option', { value }, label)));
   const bar = element('progress', { max: 1, 'aria-label': 'Progress of the movie', hidden: true });

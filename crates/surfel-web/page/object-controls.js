@@ -32,11 +32,11 @@ function materialControls({ name, kind: content }) {
       read: (scene) => materialIn(scene)?.kind ?? '',
       write: (kind, scene) => ({ material: withMaterial(scene.material, name, kind || null, {}) }) },
     property('color', { label: 'Colour', kind: 'color', placeholder: content === 'points' ? 'from the points' : 'from the file', kinds: ['matte', 'metal', 'glass', 'plastic', 'emissive', 'unlit'] }),
-    property('roughness', { label: 'Roughness', ...SLIDER, range: [0, 1], limits: [0, 1], step: 0.01, kinds: ['metal', 'glass', 'plastic'],
+    property('roughness', { label: 'Roughness', ...SLIDER, range: [0, 1], step: 0.01, kinds: ['metal', 'glass', 'plastic'],
       default: (kind) => ({ metal: 0.25, plastic: 0.2 })[kind] ?? 0 }),
-    property('ior', { label: 'IOR', ...SLIDER, range: [1, 2.5], limits: [1, 4], step: 0.01, kinds: ['glass', 'plastic'],
+    property('ior', { label: 'IOR', ...SLIDER, range: [1, 2.5], step: 0.01, kinds: ['glass', 'plastic'],
       default: () => 1.5, help: 'Index of refraction: water 1.33, glass 1.5' }),
-    property('emissive_strength', { label: 'Emission', ...SLIDER, range: [0, 10], limits: [0, 10000], step: 0.1, kinds: ['emissive'], default: () => 1 }),
+    property('emissive_strength', { label: 'Emission', ...SLIDER, range: [0, 10], step: 0.1, kinds: ['emissive'], default: () => 1 }),
   ];
 }
 

@@ -42,9 +42,16 @@ export class ProfileCard {
 
   open(figure) {
     this.#clear(figure);
+    const shown = Number(figure.width.toPrecision(3));
     const width = element('input', {
-      type: 'number', min: 0, step: 'any', value: Number(figure.width.toPrecision(3)), 'aria-label': 'Width of the strip',
-      onchange: () => 0 < width.valueAsNumber && this.measureTool.replace(this.#figure, { ...this.#figure, width: width.valueAsNumber }),
+      type: 'number', min: 0, step: 'any', value: shown, 'aria-label': 'Width of the strip',
+      onchange: () => {
+        if (0 < width.valueAsNumber) this.measureTool.replace(this.#figure, { ...this.#figure, width: width.valueAsNumber });
+        else {
+          width.value = shown;
+          this.readout.textContent = 'The width must be a positive number.';
+        }
+      },
     });
     this.card.replaceChildren(
       element('header', {}, element('h2', {}, figure.name),

@@ -7,7 +7,7 @@ import { addScaled, cross, dot, length, normalize, subtract } from './vector.js'
 export const MARGIN = { left: 64, right: 14, top: 12, bottom: 28 };
 /** Part of the chart's height that stays free above and below the points. */
 const FREE_HEIGHT = 0.06;
-const [TICK_DISTANCE_X, TICK_DISTANCE_Y] = [90, 36];
+const [TICK_DISTANCE_X, TICK_DISTANCE_Y] = [90, 24];
 
 /** Length of a line over level ground. */
 export function levelLength(points, up) {

@@ -15,6 +15,14 @@ const HINTS = {
   annotation: 'Click on a point to pin a text to it.',
   volume: 'Click on the corners of an area. Double click or Enter computes cut and fill.',
 };
+/** Tools that measure points, which meshes lack. */
+const POINT_TOOLS = ['profile', 'volume'];
+
+/** A hint in the words of fingers where these are the pointers. */
+function hintOf(tool) {
+  const hint = HINTS[tool] ?? '';
+  return matchMedia('(pointer: coarse)').matches ? hint.replace('Click', 'Tap').replace('Double click or Enter', 'Double tap') : hint;
+}
 
 /** `open` has `save()`, `export()` and `help()`, and `crosshair()` for tools that were chosen by a key. */
 export function setUpToolbar(viewer, navigation, viewHistory, open) {
@@ -41,7 +49,7 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
   });
   viewer.toolChanged.listen(() => {
     for (const button of tools) button.setAttribute('aria-pressed', button.dataset.tool === viewer.tool);
-    hint.textContent = HINTS[viewer.tool] ?? '';
+    hint.textContent = hintOf(viewer.tool);
     hint.hidden = !hint.textContent;
     document.getElementById('viewport').dataset.tool = viewer.tool;
   });
@@ -54,6 +62,17 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
   };
   viewHistory.changed.listen(showHistory);
   showHistory();
+
+  const pointTools = tools.filter(({ dataset }) => POINT_TOOLS.includes(dataset.tool));
+  viewer.sceneChanged.listen(() => {
+    const hasPoints = viewer.objects.some((object) => object.points);
+    for (const button of pointTools) {
+      button.disabled = !hasPoints;
+      button.title = hasPoints ? button.ariaLabel : `${button.ariaLabel}: needs points, and this scene has none`;
+    }
+    if (!hasPoints && POINT_TOOLS.includes(viewer.tool)) viewer.selectTool('navigate');
+    updateFocus();
+  });
 
   const fold = document.getElementById('panel-fold');
   fold.addEventListener('click', () => {

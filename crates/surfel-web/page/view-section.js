@@ -59,14 +59,23 @@ export function viewRows(viewer, navigation, openPathCard) {
 /** A row that shows a value of the camera instead of the scene. */
 function fieldRow(viewer, control) {
   const id = `field-${control.key.replaceAll('.', '_')}`;
-  const field = fieldFactories[control.kind](control, control.write, id);
+  const error = element('p', { class: 'row-error', role: 'alert', hidden: true });
+  const [low, high] = control.limits ?? [];
+  const field = fieldFactories[control.kind](control, (value, isMoving) => {
+    error.hidden = !(value < low || high < value);
+    if (error.hidden) control.write(value, isMoving);
+    else error.textContent = `found ${value}, expected a number from ${low} to ${high}`;
+  }, id);
   const row = element('div', { class: 'row', 'data-row': control.key },
-    element('label', { for: id, title: control.title }, control.label), field.element);
-  viewer.cameraChanged.listen(() => {
+    element('label', { for: id, title: control.title }, control.label), field.element, error);
+  const update = () => {
     if (!viewer.camera) return;
     row.hidden = control.isVisible ? !control.isVisible(viewer.camera) : false;
     field.show(control.read(viewer.camera), viewer);
-  });
+  };
+  viewer.cameraChanged.listen(update);
+  // A field does not take over values while it has the focus.
+  row.addEventListener('focusout', update);
   return row;
 }
 

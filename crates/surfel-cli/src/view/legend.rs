@@ -13,7 +13,8 @@ pub fn legend_json(legend: &Legend) -> Value {
         }
         Legend::Classes(classes) => {
             let entries = classes.iter().map(|LegendClass { class, name, color, .. }| {
-                json!({ "name": format!("{class} {name}"), "color": hex(*color) })
+                let name = format!("{class} {name}");
+                json!({ "class": class, "name": name, "color": hex(*color) })
             });
             let entries: Vec<Value> = entries.collect();
             json!({ "kind": "classes", "title": "class", "entries": entries })
