@@ -64,7 +64,7 @@ test('a link of a megabyte and a broken link open the initial view, with the rea
     assert.equal((await state(page, 'scene')).caption, undefined);
     await show(page, {});
     await page.evaluate((to) => { location.hash = to; }, encodeHash({ caption: 'y'.repeat(300_000) }));
-    await page.locator('.toast', { hasText: 'too long' }).waitFor();
+    await page.locator('.toast', { hasText: 'These settings are too long' }).waitFor();
     await settled(page);
     assert.ok(await page.locator('#banner').isHidden());
   }
