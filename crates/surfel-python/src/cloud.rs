@@ -176,7 +176,7 @@ impl PyCloud {
         Some(codes.map_or_else(|| text.clone(), epsg_name))
     }
 
-    /// Unit normals: float32, (N, 3), or `None`.
+    /// Normals: float32, (N, 3), or `None`. Those of a file have its lengths, those of `prepare` unit length.
     #[getter]
     fn normals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.optional(py, Some(3), |cloud| {

@@ -204,7 +204,7 @@ fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let columns = Columns {
         normals: options.normals
             || has_structures
-            || preparation.estimates_normals()
+            || preparation.overrides_normals()
             || preparation.orient.is_some_and(|orient| orient != Orientation::None),
         radii: has_structures || preparation.radius.is_some(),
         variation: options.keep_variation,

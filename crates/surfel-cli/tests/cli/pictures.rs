@@ -85,6 +85,17 @@ fn radius_scale_applies_to_fixed_and_estimated_radii() {
 }
 
 #[test]
+fn lengths_of_normals_in_a_file_may_be_radii() {
+    let folder = Folder::new();
+    let row = |i: usize| format!("{} {} 0 0 0 {:.1}\n", i % 30, i / 30, 1.5 + 0.1 * (i % 5) as f32);
+    let text = (0..900).map(row).collect::<String>();
+    let cloud = folder.write("lengths.xyz", "x y z nx ny nz\n".to_owned() + &text);
+    let output = folder.path("lengths.png");
+    let report = stderr(&surfel(&[&["render", &cloud, "-o", &output][..], &SMALL].concat()));
+    assert!(report.contains("radii 1.50 to 1.90: the lengths of the file's normals"), "{report}");
+}
+
+#[test]
 fn points_have_the_size_that_is_given_or_chosen() {
     let folder = Folder::new();
     let cloud = folder.write("two.xyz", "0 0 0 255 0 0\n10 0 0 0 255 0\n");

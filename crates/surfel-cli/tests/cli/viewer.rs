@@ -45,8 +45,12 @@ impl Server {
     }
 
     fn error(&self, path: &str) -> String {
+        self.error_of_status(400, path)
+    }
+
+    fn error_of_status(&self, expected: u16, path: &str) -> String {
         let (status, body) = self.get(path);
-        assert_eq!(status, 400, "{path}");
+        assert_eq!(status, expected, "{path}");
         String::from_utf8(body).unwrap()
     }
 }
@@ -155,15 +159,15 @@ fn errors_name_files_without_their_folders() {
     let scene = folder.write("scene.toml", sequences::scene("\"sun\"", &files));
     let prefix = folder.path("");
     let server = Server::start(&[&scene, "--spp", "1"]);
-    let assert_hidden = |query: &str, name: &str| {
-        let error = server.error(&format!("/render?resolution=40x30&{query}"));
+    let assert_hidden = |status: u16, query: &str, name: &str| {
+        let error = server.error_of_status(status, &format!("/render?resolution=40x30&{query}"));
         assert!(error.contains(name) && !error.contains(&prefix), "{query}: {error}");
     };
-    assert_hidden("color=nothing", ".ply");
+    assert_hidden(400, "color=nothing", ".ply");
     for name in sequences::FRAMES {
         fs::remove_file(folder.path(name)).unwrap();
     }
-    assert_hidden("time=1.5", ".ply");
+    assert_hidden(500, "time=1.5", ".ply");
 }
 
 #[test]

@@ -232,7 +232,7 @@ impl ObjectSettings {
         let settings = &self.preparation;
         let is_oriented = settings.orient.is_some_and(|rule| rule != Orientation::None);
         let is_bent = matches!(settings.radius, Some(Radius::Curvature { .. }));
-        let is_chosen = settings.estimates_normals() || is_oriented || is_bent;
+        let is_chosen = settings.overrides_normals() || is_oriented || is_bent;
         let is_shown = matches!(self.color.color, Some(ColorSource::Normal | ColorSource::Support));
         self.needs_structures() || is_chosen || is_shown
     }
@@ -392,7 +392,7 @@ impl PreparationSettings {
     }
 
     /// Returns true if the settings say how normals are estimated.
-    pub fn estimates_normals(&self) -> bool {
+    pub fn overrides_normals(&self) -> bool {
         self.normals_k.is_some() || self.normals_radius.is_some()
     }
 
@@ -411,7 +411,7 @@ impl PreparationSettings {
 
     /// Returns the columns of a surface that are not to be estimated.
     pub fn kept_columns(&self) -> Vec<Column> {
-        let normals = (!self.estimates_normals()).then_some(Column::Normals);
+        let normals = (!self.overrides_normals()).then_some(Column::Normals);
         let radii = self.radius.is_none().then_some(Column::Radii);
         let structure = self.radius.is_none().then(|| Column::Scalar(STRUCTURE.to_owned()));
         // Points of classes of noise, and those flagged withheld, are left out.
@@ -421,7 +421,7 @@ impl PreparationSettings {
 
     /// Drops the normals and radii that are to be estimated.
     pub fn drop_estimated(&self, cloud: &mut surfel_core::points::PointCloud) {
-        if self.estimates_normals() {
+        if self.overrides_normals() {
             cloud.normals = None;
         }
         if self.radius.is_some() {
