@@ -234,7 +234,7 @@ impl PyCloud {
         let stations = self.cloud.stations.iter().map(|station| {
             let described = PyDict::new(py);
             described.set_item("name", &station.name)?;
-            described.set_item("position", station.position.map(DVec3::to_array))?;
+            described.set_item("position", station.position.map(|position| position.to_array()))?;
             described.set_item("rotation", station.rotation.to_array())?;
             described.set_item("rows", station.grid.map(|[rows, _]| rows))?;
             described.set_item("columns", station.grid.map(|[_, columns]| columns))?;

@@ -127,7 +127,7 @@ function definePicks() {
     constructor(...words) {
       super(...words);
       this.addEventListener('message', (event) => {
-        if (typeof event.data !== 'string' || JSON.parse(event.data).type !== 'picked') return;
+        if (typeof event.data !== 'string' || JSON.parse(event.data).type !== 'pick') return;
         event.stopImmediatePropagation();
         setTimeout(() => {
           this.onmessage({ data: event.data });

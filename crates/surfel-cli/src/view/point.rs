@@ -39,9 +39,9 @@ pub fn describe(
     };
     facts["index"] = json!(index);
     let world = graph.world_from_nodes()[instance.node_idx as usize];
-    if let Some((position, decimals)) = position(cloud, index, &world, &loaded.file_info()) {
-        facts["position"] = json!(position);
-        if let Some(decimals) = decimals {
+    if let Some(found) = position(cloud, index, &world, &loaded.file_info()) {
+        facts["position"] = json!(found.position);
+        if let Some(decimals) = found.decimals {
             facts["decimals"] = json!(decimals);
         }
     }
@@ -62,7 +62,7 @@ pub fn locate(
         let instance = flat.instances.get(point.instance_idx as usize)?;
         let (cloud, index) = source(loaded, trees, instance, point.primitive_idx)?;
         let world = &world_from_nodes[instance.node_idx as usize];
-        position(cloud, index, world, &info).map(|(position, _)| position)
+        position(cloud, index, world, &info).map(|found| found.position)
     });
     located.collect()
 }
@@ -82,26 +82,33 @@ fn source<'l>(
     }
 }
 
-/// Returns the world position of a point of a cloud, and the decimals of its coordinates where the file is not moved;
-/// none for a deformed point, which is where it was hit.
+/// The place of a point as exact as its file has it.
+struct ExactPosition {
+    /// World coordinates.
+    position: [f64; 3],
+    /// Decimals of the coordinates in the file; none where it is moved.
+    decimals: Option<[Option<usize>; 3]>,
+}
+
+/// Returns the exact position of a point of a cloud; none for a deformed point, which is where it was hit.
 fn position(
     cloud: &PointCloud,
     index: usize,
     world_from_cloud: &DAffine3,
     info: &FileInfo,
-) -> Option<([f64; 3], Option<[Option<usize>; 3]>)> {
+) -> Option<ExactPosition> {
     if !cloud.morphs.is_empty() || cloud.skin.is_some() {
         return None;
     }
     if *world_from_cloud != DAffine3::IDENTITY {
         let moved = world_from_cloud.transform_point3(cloud.world_position(index));
-        return Some((moved.to_array(), None));
+        return Some(ExactPosition { position: moved.to_array(), decimals: None });
     }
     let in_file = coordinates(cloud, index, info);
-    Some((
-        in_file.map(|coordinate| coordinate.value),
-        Some(in_file.map(|coordinate| coordinate.decimals)),
-    ))
+    Some(ExactPosition {
+        position: in_file.map(|coordinate| coordinate.value),
+        decimals: Some(in_file.map(|coordinate| coordinate.decimals)),
+    })
 }
 
 /// Returns the nearest name at a node or above it.

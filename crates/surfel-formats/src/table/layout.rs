@@ -332,7 +332,7 @@ fn rounded_to_unit(normal: Vec3) -> Vec3 {
     const MAX_ROUNDING: f32 = 0.01;
     let error = (normal.length() - 1.0).abs();
     // Division would change the last bits of a vector that is normalized already.
-    if 1e-6 <= error && error < MAX_ROUNDING { normal / normal.length() } else { normal }
+    if (1e-6..MAX_ROUNDING).contains(&error) { normal / normal.length() } else { normal }
 }
 
 #[cfg(test)]
