@@ -13,7 +13,7 @@ let opening;
 before(async () => {
   server = await serve(['town.ply'], ...QUICK);
   // Wide enough to click next to the card.
-  page = await openPage(server.link, { viewport: { width: 900, height: 440 } });
+  page = await openPage(server.link, { viewport: { width: 1100, height: 440 } });
   await unfoldPanel(page);
   first = await finishedPixels(page);
   opening = await state(page, 'camera');
