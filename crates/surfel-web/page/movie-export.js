@@ -1,7 +1,8 @@
 // The part of the camera path's card that exports the path as a movie: format, size, rate, progress and file.
 
 import { element } from './dom.js';
-import { counted, duration, fileSize, stemOf } from './format.js';
+import { FileRequest } from './file-request.js';
+import { counted, fileSize, stemOf } from './format.js';
 
 const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'animated PNG' };
 
@@ -15,54 +16,32 @@ export function setUpMovieExport(viewer, sceneFile) {
   const note = element('p', { class: 'note', role: 'status' });
   const link = element('a', { class: 'button is-main', 'data-action': 'download-movie', hidden: true }, 'Download');
   const start = element('button', { type: 'button', class: 'button', 'data-action': 'movie', onclick: () => write() }, 'Export movie');
-  const cancel = element('button', { type: 'button', class: 'button', 'data-action': 'cancel-movie', hidden: true, onclick: () => abort?.abort() }, 'Cancel');
+  const cancel = element('button', { type: 'button', class: 'button', 'data-action': 'cancel-movie', hidden: true, onclick: () => request.cancel() }, 'Cancel');
   const part = element('div', { class: 'movie' },
     element('h3', {}, 'Movie'),
     element('div', { class: 'chips' }, format, width, element('span', { 'aria-hidden': 'true' }, '×'), height, fps, element('span', { class: 'note' }, 'fps')),
     element('div', { class: 'chips' }, start, cancel, link, sceneFile), bar, note);
-  let abort = null;
   let isEmpty = true;
 
-  const show = (isWriting, text) => {
-    bar.hidden = cancel.hidden = !isWriting;
+  const request = new FileRequest(viewer, { bar, note, link, suit: (isWriting) => {
+    cancel.hidden = !isWriting;
     start.disabled = isWriting || isEmpty;
-    note.textContent = text;
-  };
+  } });
 
   const size = () => ({ width: width.valueAsNumber || 1280, height: height.valueAsNumber || 720 });
 
   const write = async () => {
     if (![width, height, fps].every((field) => field.reportValidity())) return;
-    link.hidden = true;
-    bar.removeAttribute('value');
-    show(true, 'Waiting');
-    abort = new AbortController();
-    const progress = ({ done, left_secs }) => {
-      if (typeof done === 'number') bar.value = done;
-      note.textContent = typeof left_secs === 'number' ? `Rendering, ${duration(left_secs)} left` : 'Rendering';
-    };
-    try {
-      const message = { type: 'movie', format: format.value, ...size(), fps: fps.valueAsNumber || 25 };
-      const { address, n_frames, n_bytes } = await viewer.request(message, { progress, abort: abort.signal });
-      link.href = address;
-      link.download = `${stemOf(viewer.info.name)}-movie.${format.value}`;
-      link.hidden = false;
-      show(false, `${counted(n_frames, 'frame')}, ${fileSize(n_bytes)}`);
-    } catch (error) {
-      show(false, error.message === 'cancelled' ? 'Cancelled.' : error.message);
-    }
-    abort = null;
+    const message = { type: 'movie', format: format.value, ...size(), fps: fps.valueAsNumber || 25 };
+    await request.run(message, { work: 'Rendering', first: 'Waiting' }, ({ address, n_frames, n_bytes }) => {
+      request.offer(address, `${stemOf(viewer.info.name)}-movie.${message.format}`);
+      return `${counted(n_frames, 'frame')}, ${fileSize(n_bytes)}`;
+    });
   };
-
-  // The server keeps the movie as long as the page is connected.
-  viewer.connectionChanged.listen(() => {
-    if (!link.hidden) show(false, '');
-    link.hidden = true;
-  });
 
   const update = (isNowEmpty) => {
     isEmpty = isNowEmpty;
-    if (!abort) start.disabled = isEmpty;
+    if (!request.isRunning) start.disabled = isEmpty;
   };
   return { part, size, update };
 }
