@@ -2,8 +2,7 @@
 
 use crate::description::Invalid;
 use crate::error::Result;
-use surfel_core::math::Aabb;
-use surfel_core::points::PreparedCloud;
+use surfel_core::points::mean_overlap;
 use surfel_core::scene::{Geometry, Graph, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
 
@@ -23,7 +22,8 @@ pub fn check_overlap(graph: &Graph) -> Result<()> {
         if points.surface == SurfaceKind::Points {
             continue;
         }
-        let overlap = mean_overlap(points.cloud());
+        let (radii, bounds) = (points.cloud().radii(), inlier_bounds(points.cloud()));
+        let overlap = mean_overlap(radii.len(), radii.iter().copied(), bounds);
         if MAX_OVERLAP < overlap {
             let message = format!(
                 "found {overlap:.0} points over each other, expected at most {MAX_OVERLAP}; \
@@ -33,15 +33,4 @@ pub fn check_overlap(graph: &Graph) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The number of discs over each other, about: their area as a fraction of that of a box around them.
-fn mean_overlap(cloud: &PreparedCloud) -> f32 {
-    let radii = cloud.radii();
-    let n = radii.len().max(1) as f64;
-    let sum = |power: i32| radii.iter().map(|radius| f64::from(*radius).powi(power)).sum::<f64>();
-    let Aabb { min, max } = inlier_bounds(cloud);
-    let size = (max - min).as_dvec3() + 2.0 * sum(1) / n;
-    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-    (std::f64::consts::PI * sum(2) / area) as f32
 }

@@ -16,7 +16,7 @@ use crate::scene::CloudGeometry;
 use crate::scene::color::SupportColors;
 use crate::surface::{EdgeTest, MIN_SLIT_DEPTH, SurfaceKind, SurfaceOptions, edge_retest_factor};
 
-/// Number of discs over each other, on average, beyond which they are crowded. Usual are 2 to 5.
+/// Number of discs over each other, on average, beyond which they are crowded.
 const MAX_OVERLAP: f32 = 50.0;
 
 /// A point cloud with the surface that its points describe.
@@ -42,7 +42,8 @@ pub struct FlatCloud {
     pub edge_test: EdgeTest,
     /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose.
     pub edge_retest_factor: f32,
-    /// True if rays meet so many discs that none may be tested in vain: then the nearest ones alone decide about shadows.
+    /// True if so many discs lie over each other that the edge test of each one that a shadow ray meets takes too long: the
+    /// search for the nearest hit, which gives up after a few rejected ones, then decides about shadows of discs.
     pub is_crowded: bool,
     /// True if normals point out of the body that the points enclose.
     pub has_outward_normals: bool,

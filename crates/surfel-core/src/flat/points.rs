@@ -8,6 +8,7 @@ use crate::bvh::{self, BvhNode, BvhPrimitive, NO_PRIMITIVE};
 use crate::error::Result;
 use crate::image::decode_srgb8;
 use crate::math::{Aabb, LANES, Vec3, median};
+use crate::points::mean_overlap;
 use crate::progress::Progress;
 use crate::surface::{SurfaceKind, Surfel};
 use rayon::prelude::*;
@@ -97,29 +98,21 @@ impl FlatPoints {
     /// two of a block's points in radii. It is about 0.4 for evenly spaced points and 0.15 for random ones; infinite
     /// if no block is full.
     pub(super) fn evenness(&self) -> f32 {
-        const N_SAMPLES: usize = 1000;
-        let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
-        let sample = self.blocks.iter().step_by(step);
-        median(sample.filter_map(PointBlock::min_distance)).unwrap_or(f32::INFINITY)
+        median(self.sample().filter_map(PointBlock::min_distance)).unwrap_or(f32::INFINITY)
     }
 
-    /// Returns the number of discs over each other, about: their area as a fraction of that of a box around them, by a
-    /// sample of the blocks; 0 without points.
-    pub(super) fn overlap(&self) -> f32 {
+    /// Returns up to a thousand blocks, spread over all.
+    fn sample(&self) -> impl Iterator<Item = &PointBlock> + Clone {
         const N_SAMPLES: usize = 1000;
         let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
-        let sample = self.blocks.iter().step_by(step);
+        self.blocks.iter().step_by(step)
+    }
+
+    /// Returns the number of discs over each other, by a sample of the blocks and their greatest radii.
+    pub(super) fn overlap(&self) -> f32 {
+        let sample = self.sample();
         let bounds = Aabb::of_points(sample.clone().map(|block| block.position(0)));
-        let radii = sample.map(|block| f64::from(block.max_radius()));
-        let (count, sum, squares) = radii.fold((0.0, 0.0, 0.0), |(count, sum, squares), radius| {
-            (count + 1.0, sum + radius, squares + radius * radius)
-        });
-        if bounds.is_empty() {
-            return 0.0;
-        }
-        let size = bounds.size().as_dvec3() + 2.0 * sum / count;
-        let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-        (self.ids.len() as f64 * std::f64::consts::PI * squares / count / area) as f32
+        mean_overlap(self.ids.len(), sample.map(PointBlock::max_radius), bounds)
     }
 
     /// Returns the radius of the point at `slot`.

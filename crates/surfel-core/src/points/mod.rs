@@ -61,6 +61,7 @@ pub use preparation::{Preparation, SURFACE_VARIATION};
 pub use prepare::{PreparationReport, prepare};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
+pub use radii::overlap::mean_overlap;
 pub use radii::radius::{DEFAULT_RADIUS_SAMPLES, Radius, RadiusReport, spacing};
 pub use scan::grid_rays::locate_stations;
 pub use scan::mixed_pixels::MixedPixels;

@@ -5,7 +5,7 @@ use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::surface::{EdgeTest, SurfaceKind};
-use surfel_core::trace::SurfaceHit;
+use surfel_core::trace::{Simd, SurfaceHit, occlusions};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -188,4 +188,19 @@ fn the_scale_of_a_cloud_does_not_matter() {
             assert!((distance - (5.0 - height)).abs() < 0.02, "{kind:?} {scale}: {ray:?} {hit:?}");
         }
     }
+}
+
+#[test]
+fn crowded_discs_occlude_where_the_search_for_the_nearest_hits() {
+    let mut cloud = clouds::sphere(3000, 1.0);
+    assert!(!scenes::flat(cloud.clone(), SurfaceKind::Splat).is_crowded);
+    cloud.radii = Some(vec![0.7; cloud.len()]);
+    let flat = scenes::flat(cloud, SurfaceKind::Splat);
+    assert!(flat.is_crowded);
+    let rays = scenes::random_rays(300, 1.5, 8);
+    let mut occluded = vec![false; rays.len()];
+    occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+    let are_hit: Vec<bool> = hits(&flat, &rays).iter().map(|hit| !hit.is_miss()).collect();
+    assert_eq!(occluded, are_hit);
+    assert!(are_hit.contains(&true) && are_hit.contains(&false));
 }

@@ -142,9 +142,6 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
 #[inline(always)]
 fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
     match cloud.surface {
-        SurfaceKind::Smooth if cloud.is_crowded => {
-            nearest_occlusions(rays, occluded, |hits| trace_smooth::<L>(cloud, rays, hits));
-        }
         SurfaceKind::Smooth => {
             any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
         }
