@@ -10,7 +10,7 @@ use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
     CloudBuilder, ColumnField, ColumnRole, Field, NumberType, ParseFault, RecordLayout, TextChunk,
-    find_line_end, parse_chunks, parse_number, words_of,
+    find_line_end, parse_chunks, parse_number, parse_numbers, words_of,
 };
 
 /// Number of chunks of text whose cells are in memory at a time.
@@ -197,9 +197,7 @@ impl Header {
 fn parse_cells(chunk: TextChunk) -> std::result::Result<Vec<f64>, ParseFault> {
     let mut cells = Vec::new();
     for (byte, line) in chunk.lines(find_line_end) {
-        for word in words_of(line) {
-            cells.push(parse_number(word).map_err(|error| ParseFault::new(byte, error))?);
-        }
+        parse_numbers(line, &mut cells).map_err(|error| ParseFault::new(byte, error))?;
     }
     Ok(cells)
 }

@@ -13,7 +13,7 @@ use crate::mesh::{Model, linear_colors, relative_to_origin, repair_model};
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::table::{
     ColorRange, LineError, ParseFault, Tolerance, find_line_end, keep_matching, line_at,
-    parse_number, words_of,
+    parse_numbers, words_of,
 };
 
 /// Number of lines between two looks for cancellation.
@@ -225,11 +225,8 @@ impl<'a> Body<'a> {
                 .next_line()
                 .ok_or_else(|| input.truncated(Location::Byte(input.len() as u64), i, n_lines))?;
             numbers.clear();
-            let words = words_of(line);
             let fault = |error| -> Error { ParseFault::new(start, error).into_error(input) };
-            for word in words {
-                numbers.push(parse_number(word).map_err(fault)?);
-            }
+            parse_numbers(line, &mut numbers).map_err(fault)?;
             visit(&numbers).map_err(fault)?;
         }
         Ok(())

@@ -7,7 +7,7 @@ use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
 use crate::stations::MAX_STATIONS;
-use crate::table::{MAX_LINE_LENGTH, parse_number, words_of};
+use crate::table::{MAX_LINE_LENGTH, parse_numbers};
 
 /// Number of lines before the points of a scan: columns, rows, scanner position, its three axes, and the four rows of
 /// the transform.
@@ -217,18 +217,14 @@ impl<'a> Lines<'a> {
     /// Returns the numbers of the next line.
     fn numbers<const N: usize>(&mut self, expected: &str) -> Result<[f64; N]> {
         let line = self.next()?;
-        let words = words_of(line);
-        let mut numbers = [0.0; N];
-        let mut n_found = 0;
-        for word in words {
-            let number = parse_number(word).ok().filter(|number| number.is_finite());
-            let (Some(slot), Some(number)) = (numbers.get_mut(n_found), number) else {
-                return Err(self.malformed(line, expected));
-            };
-            *slot = number;
-            n_found += 1;
+        let mut numbers = Vec::new();
+        let is_number = parse_numbers(line, &mut numbers).is_ok();
+        match <[f64; N]>::try_from(numbers) {
+            Ok(numbers) if is_number && numbers.iter().all(|number| number.is_finite()) => {
+                Ok(numbers)
+            }
+            _ => Err(self.malformed(line, expected)),
         }
-        if n_found == N { Ok(numbers) } else { Err(self.malformed(line, expected)) }
     }
 
     /// Returns the error of the line that was read last.
