@@ -1,8 +1,8 @@
-//! Loading: points a second of binary PLY and PCD, PTX and E57, and of LAZ relative to its decoder alone on the same
-//! bytes.
+//! Loading: points a second of each format, of LAZ relative to its decoder alone on the same bytes, and of a filter; and
+//! the time to read a header alone.
 //!
 //! `cargo bench -p surfel-tests --bench loading`; `POINTS` sets the number of points (by default 12 million of PLY
-//! and PCD, 5 million of LAZ and 3 million of PTX and E57).
+//! and PCD, 5 million of LAZ and 3 million of the others).
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,9 @@ use laz::{LazVlr, ParLasZipDecompressor};
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
-use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
+use surfel_formats::{LoadOptions, SaveOptions, inspect, load, load_bytes, save};
 
-criterion_group!(benches, ply, laz, pcd, ptx, e57);
+criterion_group!(benches, ply, laz, pcd, ptx, e57, text, grid, off, filter, header);
 criterion_main!(benches);
 
 /// Whether `cargo bench` runs this program; `cargo test` only checks that it works.
@@ -129,6 +129,68 @@ fn e57(criterion: &mut Criterion) {
     drop(writer);
     let bytes = file.into_inner();
     time_format(criterion, "e57", "25-bit xyz, rgb, intensity", cloud.len(), &bytes);
+}
+
+fn text(criterion: &mut Criterion) {
+    let cloud = survey(n_points(3_000_000));
+    let mut text = String::new();
+    for (position, [r, g, b]) in cloud.positions.iter().zip(cloud.colors.iter().flatten()) {
+        let Vec3 { x, y, z } = position;
+        let [r, g, b] = [r, g, b].map(|channel| channel >> 8);
+        text += &format!("{x:.3} {y:.3} {z:.3} {r} {g} {b}\n");
+    }
+    time_format(criterion, "xyz", "xyz rgb", cloud.len(), text.as_bytes());
+}
+
+fn grid(criterion: &mut Criterion) {
+    let cloud = survey(n_points(3_000_000));
+    let n_rows = cloud.len() / 2000;
+    let mut text = format!("ncols 2000\nnrows {n_rows}\nxllcorner 0\nyllcorner 0\ncellsize 0.15\n");
+    for row in cloud.positions.chunks_exact(2000) {
+        text += &row.iter().map(|position| format!("{:.3} ", position.z)).collect::<String>();
+        text += "\n";
+    }
+    time_format(criterion, "asc", "heights", 2000 * n_rows, text.as_bytes());
+}
+
+fn off(criterion: &mut Criterion) {
+    let cloud = survey(n_points(3_000_000));
+    let mut text = format!("OFF\n{} 0 0\n", cloud.len());
+    for Vec3 { x, y, z } in &cloud.positions {
+        text += &format!("{x:.3} {y:.3} {z:.3}\n");
+    }
+    time_format(criterion, "off", "vertices", cloud.len(), text.as_bytes());
+}
+
+fn filter(criterion: &mut Criterion) {
+    let cloud = survey(n_points(5_000_000));
+    let filtered =
+        LoadOptions { filter: Some("intensity > 20".parse().unwrap()), ..LoadOptions::default() };
+    for extension in ["laz", "las", "ply"] {
+        let path = file(&cloud, extension);
+        let read = |options: &LoadOptions| load(&path, options, &NoProgress).unwrap();
+        let mut group = criterion.benchmark_group(format!("filter {extension}"));
+        group.throughput(Throughput::Elements(cloud.len() as u64)).sample_size(10);
+        group.bench_function("no filter", |bencher| bencher.iter(|| read(&LoadOptions::default())));
+        group.bench_function("keeps 99 %", |bencher| bencher.iter(|| read(&filtered)));
+        group.finish();
+        if is_timed() {
+            let ratio = median_ratio(|| read(&filtered), || read(&LoadOptions::default()));
+            report(&format!("{extension}: with a filter loading takes {ratio:.3} times as long"));
+        }
+        std::fs::remove_file(path).unwrap();
+    }
+}
+
+fn header(criterion: &mut Criterion) {
+    let cloud = survey(n_points(5_000_000));
+    let mut group = criterion.benchmark_group("header");
+    for extension in ["las", "laz", "ply"] {
+        let path = file(&cloud, extension);
+        group.bench_function(extension, |bencher| bencher.iter(|| inspect(&path).unwrap()));
+        std::fs::remove_file(path).unwrap();
+    }
+    group.finish();
 }
 
 /// Times loading of a file with this extension.

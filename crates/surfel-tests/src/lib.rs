@@ -5,6 +5,7 @@ pub mod shared_data;
 pub mod cancel_after;
 pub mod clouds;
 pub mod scenes;
+pub mod field_bvh;
 pub mod backends;
 pub mod ground_truth;
 pub mod shapes;

@@ -4,7 +4,7 @@ use super::clouds::{self, Subject};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{DVec3, Ray, Vec3};
 use surfel_core::progress::NoProgress;
-use surfel_core::surface::SurfaceKind;
+use surfel_core::surface::{Align, SurfaceKind};
 use surfel_core::trace::{Simd, SurfaceHit, surface_hits};
 
 /// Distance from an edge of the cube in which hits count, in sides of the cube.
@@ -12,53 +12,82 @@ const EDGE_WIDTH: f32 = 0.02;
 /// Angle in degrees from which on a normal is wrong.
 const WRONG_DEG: f32 = 30.0;
 
-/// Asserts that normals which all point outward are right at visible edges.
+/// Asserts that normals which all point outward are right at the edges of a cube.
 pub fn check() {
-    let (_, wrong) = wrong_edges(&clouds::cube(), SurfaceKind::Splat, 128);
-    assert!(wrong < 0.5, "{wrong}");
+    let flat = flat(&clouds::cube(), SurfaceKind::Splat, Align::default());
+    let Shares { visible, silhouettes } = wrong_edges(&clouds::cube(), &flat, 128);
+    assert!(visible < 0.5 && silhouettes < 0.5, "{visible}, {silhouettes}");
 }
 
-/// Prints for all kinds the share of wrong normals at the visible edges of a cube.
+/// Prints for all kinds, and all rules that turn normals, the percentage of wrong normals at the edges of a cube.
 pub fn print_edges() {
     let outward = clouds::cube();
     let random = outward.with_random_signs();
-    println!("\n| surface | outward normals | normals of random sign |\n| --- | --- | --- |");
-    for (name, kind) in SurfaceKind::ALL {
-        if matches!(kind, SurfaceKind::Points | SurfaceKind::Gaussian) {
-            continue;
-        }
-        let [outward, random] =
-            [&outward, &random].map(|subject| 100.0 * wrong_edges(subject, kind, 512).1);
-        println!("| `{name}` | {outward:.1} | {random:.1} |");
+    println!(
+        "\n| surface | visible, outward | visible, random signs | silhouettes, outward | silhouettes, random signs |\n{}|",
+        "| --- ".repeat(5)
+    );
+    for (label, kind, align) in rows() {
+        let [outward, random] = [&outward, &random]
+            .map(|subject| wrong_edges(subject, &flat(subject, kind, align), 512));
+        let columns = [outward.visible, random.visible, outward.silhouettes, random.silhouettes];
+        println!(
+            "| {label} | {} |",
+            columns.map(|share| format!("{:.1}", 100.0 * share)).join(" | ")
+        );
     }
 }
 
-/// Returns the number of pixels at edges between two sides of the cube that are both seen, and the share of those whose
-/// normal is wrong.
-fn wrong_edges(subject: &Subject, kind: SurfaceKind, resolution: u32) -> (usize, f64) {
-    let flat = FlatCloud::new(&subject.geometry(kind), &NoProgress).unwrap();
+/// Returns labels, kinds and rules.
+fn rows() -> Vec<(String, SurfaceKind, Align)> {
+    let kinds = SurfaceKind::ALL.into_iter();
+    let kinds =
+        kinds.filter(|(_, kind)| !matches!(kind, SurfaceKind::Points | SurfaceKind::Gaussian));
+    let rules = Align::ALL
+        .map(|(name, align)| (format!("`splat`, `--align {name}`"), SurfaceKind::Splat, align));
+    kinds.map(|(name, kind)| (format!("`{name}`"), kind, Align::default())).chain(rules).collect()
+}
+
+fn flat(subject: &Subject, kind: SurfaceKind, align: Align) -> FlatCloud {
+    let mut geometry = subject.geometry(kind);
+    geometry.options.align = align;
+    FlatCloud::new(&geometry, &NoProgress).unwrap()
+}
+
+/// Shares of pixels at edges whose normal is wrong.
+struct Shares {
+    /// Share at edges of which both sides are seen.
+    visible: f64,
+    /// Share at edges of which one side is seen.
+    silhouettes: f64,
+}
+
+/// Compares normals at the edges of the cube with those of both sides and their mean.
+fn wrong_edges(subject: &Subject, flat: &FlatCloud, resolution: u32) -> Shares {
     let view = subject.camera.view(DVec3::ZERO, resolution, resolution);
     let pixels = (0..resolution * resolution).map(|i| (i % resolution, i / resolution));
     let ray = |(x, y): (u32, u32)| view.ray(x as f32 + 0.5, y as f32 + 0.5);
     let rays: Vec<Ray> = pixels.map(ray).collect();
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    surface_hits(&flat, Simd::detect(), &rays, &mut hits);
-    let (mut n_edge, mut n_wrong) = (0, 0);
+    surface_hits(flat, Simd::detect(), &rays, &mut hits);
+    let [mut visible, mut silhouettes] = [(0, 0); 2];
     for (ray, hit) in rays.iter().zip(&hits).filter(|(_, hit)| !hit.is_miss()) {
         let position = ray.at(hit.distance);
-        let is_near = |axis: usize| 1.0 - 2.0 * EDGE_WIDTH < position[axis].abs();
-        let seen = (0..3).filter(|axis| is_near(*axis)).map(|axis| side(axis, position));
-        let seen: Vec<Vec3> = seen.filter(|normal| normal.dot(ray.direction) < 0.0).collect();
-        if seen.len() < 2 {
+        let is_near = |axis: &usize| 1.0 - 2.0 * EDGE_WIDTH < position[*axis].abs();
+        let sides: Vec<Vec3> = (0..3).filter(is_near).map(|axis| side(axis, position)).collect();
+        let n_seen = sides.iter().filter(|normal| normal.dot(ray.direction) < 0.0).count();
+        if sides.len() != 2 || n_seen == 0 {
             continue;
         }
+        let (n, n_wrong) = if n_seen == 2 { &mut visible } else { &mut silhouettes };
+        let between = (sides[0] + sides[1]).normalize();
         let angle = |normal: &Vec3| normal.angle_between(hit.normal).to_degrees();
-        let between = seen.iter().copied().sum::<Vec3>().normalize();
-        let least = seen.iter().chain([&between]).map(angle).fold(f32::INFINITY, f32::min);
-        n_edge += 1;
-        n_wrong += usize::from(WRONG_DEG < least);
+        let least = sides.iter().chain([&between]).map(angle).fold(f32::INFINITY, f32::min);
+        *n += 1;
+        *n_wrong += u32::from(WRONG_DEG < least);
     }
-    (n_edge, n_wrong as f64 / n_edge.max(1) as f64)
+    let share = |(n, n_wrong): (u32, u32)| f64::from(n_wrong) / f64::from(n.max(1));
+    Shares { visible: share(visible), silhouettes: share(silhouettes) }
 }
 
 /// Returns the outward normal of the cube's side at a position.

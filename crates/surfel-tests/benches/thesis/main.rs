@@ -1,8 +1,9 @@
 //! The tables and figures of C. Wiesmeier, Ray Tracing Point Clouds (2011), repeated: the figures of docs/thesis.md.
 //!
 //! `cargo bench -p surfel-tests --bench thesis -- WORDS`: the words `table1`, `table2`, `kinds`, `further`, `counts`,
-//! `edges` and `figures` select parts, without any all are made; `counts` needs `--features counts`, which slows the others. The standard output has the tables as the document shows them, the standard
-//! error what is skipped. `--pictures FOLDER` writes the figures and a picture of each kind.
+//! `structures`, `edges` and `figures` select parts, without any all are made. `counts`, and the columns of the kd-tree in
+//! `structures`, need `--features counts`, which slows the others. The standard output has the tables as the document shows
+//! them, the standard error what is skipped. `--pictures FOLDER` writes the figures and a picture of each kind.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a benchmark prints its tables")]
 
 mod clouds;
@@ -12,6 +13,7 @@ mod edges;
 mod kinds;
 mod further;
 mod counts;
+mod structures;
 mod figures;
 
 use std::path::PathBuf;
@@ -40,6 +42,9 @@ fn main() {
     }
     if is_wanted("counts") {
         counts::print_counts();
+    }
+    if is_wanted("structures") {
+        structures::print_structures();
     }
     if is_wanted("edges") {
         edges::print_edges();

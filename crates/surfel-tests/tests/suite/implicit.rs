@@ -8,9 +8,10 @@ use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::CloudGeometry;
-use surfel_core::surface::{EdgeTest, FIELD_SUPPORT, FieldPoint, FieldSums, SurfaceKind};
+use surfel_core::surface::{EdgeTest, FieldPoint, SurfaceKind};
 use surfel_core::trace::{Simd, SurfaceHit, occlusions};
 use surfel_tests::clouds;
+use surfel_tests::field_bvh::{FieldBvh, SearchCounts, field_point, zero_between};
 use surfel_tests::scenes;
 
 const KIND: SurfaceKind = SurfaceKind::Implicit;
@@ -114,21 +115,6 @@ fn sheets_closer_than_the_reach_of_their_points_stay_apart() {
     }
 }
 
-/// Returns the field of some points at a position, if it has a value, and the sum of their weighted normals. Normals are
-/// turned to the side of the guide's.
-fn field_at(points: &[FieldPoint], guide: &FieldPoint, position: Vec3) -> (Option<f32>, Vec3) {
-    let (mut sums, mut normals) = (FieldSums::new(), Vec3::ZERO);
-    for point in points {
-        let normal = if point.is_flipped(guide) { -point.normal } else { point.normal };
-        let offset = position - point.center;
-        let inside = 1.0 - (offset.length() / point.support).powi(2);
-        let weight = inside.max(0.0).powi(4);
-        sums.add(weight, normal.dot(offset));
-        normals += weight * normal;
-    }
-    (Some(sums.value()).filter(|(_, has_value)| *has_value).map(|(value, _)| value), normals)
-}
-
 /// Marches along a ray through the field of all points, and returns the distance of the first zero at which the field
 /// grows along the normals.
 fn march(points: &[FieldPoint], ray: &Ray) -> Option<f32> {
@@ -145,20 +131,10 @@ fn march(points: &[FieldPoint], ray: &Ray) -> Option<f32> {
         start = start.max(along(&near[i]) - support);
         while start < along(&near[i]) + support {
             let end = start + step;
-            let middle = ray.at(start + 0.5 * step);
             let reached = near.iter().skip(i).take_while(|point| along(point) < end + support);
-            let reached: Vec<FieldPoint> = reached.copied().collect();
-            let distance = |point: &FieldPoint| point.center.distance_squared(middle);
-            let guide = reached.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            let at = |t: f32| field_at(&reached, guide.unwrap(), ray.at(t));
-            if let ((Some(a), normals), (Some(b), _)) = (at(start), at(end))
-                && (0.0 < a) != (0.0 < b)
-            {
-                let zero = start + step * a / (a - b);
-                let is_surface = 0.0 <= normals.dot(ray.direction) * (b - a);
-                if is_surface && ray.t_min <= zero && zero <= ray.t_max {
-                    return Some(zero);
-                }
+            let zero = zero_between(reached, ray, [start, end]);
+            if let Some(zero) = zero.filter(|zero| ray.t_min <= *zero && *zero <= ray.t_max) {
+                return Some(zero);
             }
             start = end;
         }
@@ -181,12 +157,8 @@ fn the_kd_tree_finds_the_first_zeros_of_the_field_of_all_points() {
     for (name, cloud) in tested {
         let mut flat = scenes::flat(cloud, KIND);
         flat.edge_test = EdgeTest::Off;
-        let decode = |slot| FieldPoint {
-            center: flat.points.center(slot),
-            normal: flat.points.normal(slot),
-            support: FIELD_SUPPORT * flat.points.radius(slot),
-        };
-        let points: Vec<FieldPoint> = flat.points.slots().map(decode).collect();
+        let points: Vec<FieldPoint> =
+            flat.points.slots().map(|slot| field_point(&flat.points, slot)).collect();
         let rays = scenes::random_rays(4000, 1.2, 5);
         let found = hits(&flat, &rays);
         let n_hits = found.iter().filter(|hit| !hit.is_miss()).count();
@@ -201,6 +173,24 @@ fn the_kd_tree_finds_the_first_zeros_of_the_field_of_all_points() {
             rays.len()
         );
     }
+}
+
+#[test]
+fn the_kd_tree_and_the_hierarchy_of_the_points_find_the_same_surface() {
+    let mut flat = scenes::flat(clouds::sphere(20_000, 1.0), KIND);
+    flat.edge_test = EdgeTest::Off;
+    let bvh = FieldBvh::new(&flat);
+    let rays = scenes::random_rays(4000, 1.2, 6);
+    let found = hits(&flat, &rays);
+    let differs = |(hit, ray): &(&SurfaceHit, &Ray)| match bvh
+        .first_zero(ray, &mut SearchCounts::default())
+    {
+        Some(distance) => hit.is_miss() || 0.1 * hit.radius < (hit.distance - distance).abs(),
+        None => !hit.is_miss(),
+    };
+    let n_different = found.par_iter().zip(&rays).filter(differs).count();
+    let n_hits = found.iter().filter(|hit| !hit.is_miss()).count();
+    assert!(400 < n_hits && n_different <= 4, "{n_different} of {} rays differ", rays.len());
 }
 
 #[test]
