@@ -49,6 +49,7 @@ pub fn render_frames(
     if received.is_err() {
         // It may have ended already.
         let _ = python.child.kill();
+        let _ = python.child.wait();
     }
     received.and_then(|()| python.end())
 }
@@ -107,8 +108,9 @@ impl Python {
         let mut child = command.spawn().map_err(missing)?;
         let (stdin, stdout, stderr) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let job = job.to_string();
         // An interpreter that has ended says why on stderr.
-        let _ = stdin.map(|mut stdin| stdin.write_all(job.to_string().as_bytes()));
+        thread::spawn(move || stdin.map(|mut stdin| stdin.write_all(job.as_bytes())));
         let (sender, frames) = sync_channel(1);
         thread::spawn(move || stdout.map(|stdout| send_frames(stdout, &sender)));
         let messages = thread::spawn(move || {
