@@ -47,7 +47,7 @@ impl PointSource {
     ) -> Result<Loaded> {
         match self {
             Self::File(file) => surfel_formats::load(&file, options, progress)
-                .map_err(|error| reading_error(error, settings)),
+                .map_err(|error| reading_error(&file, error, settings)),
             Self::Cloud(cloud, info) => {
                 let none = cloud.subset(&[]);
                 let cloud = Arc::unwrap_or_clone(cloud);

@@ -8,7 +8,6 @@ use crate::resolve::{
     MemoryEstimate, check_empty, report_crossing_rings, report_denoise, report_normals,
     report_radii, report_unused_of_files, report_unused_structure,
 };
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::points::{
     Denoise, Duplicates, MixedPixels, NoisePoints, Orientation, PointCloud, Preparation, STRUCTURE,
@@ -95,12 +94,13 @@ fn read(
     let names = names(&sources);
     let inspected = names.iter().zip(&sources);
     let inspected = inspected.map(|(name, source)| Ok((name.as_path(), source.inspect()?)));
-    let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
+    let infos = inspected.collect::<surfel_formats::Result<Vec<(&Path, FileInfo)>>>()?;
+    let infos = || infos.iter().map(|(name, info)| (*name, info));
     // How many points a filter keeps, and a text has, is known when they are read.
     if !settings.filters_points() {
-        check_points(MemoryEstimate::from_files(&infos, settings.subsample, 0))?;
+        check_points(MemoryEstimate::from_files(infos(), settings.subsample, 0))?;
     }
-    report_unused_of_files(infos.values(), settings, progress);
+    report_unused_of_files(infos().map(|(_, info)| info), settings, progress);
     report_crossing_rings([settings], progress);
     let options = settings.load_options(ColumnChoice::All)?;
     let mut parts: Vec<Loaded> = Vec::new();
@@ -109,7 +109,7 @@ fn read(
         if settings.reproject == Some(true) {
             // To the coordinate system of those before.
             let others = parts.iter().find_map(|part| part.info.coordinate_system.as_deref());
-            move_to_metres(&mut part.cloud, &mut part.info, others, progress);
+            move_to_metres(&mut part.cloud, &mut part.info, others, progress)?;
         }
         parts.push(part);
     }
@@ -124,7 +124,7 @@ fn read(
     check_points(MemoryEstimate::of_points(loaded.cloud.len() as u64, settings.subsample))?;
     let points = counted(loaded.cloud.len(), "point");
     progress.note(&format!("{points}, {}", loaded.info.format));
-    if settings.reproject.is_none() {
+    if settings.reproject.is_none() && !loaded.info.is_in_metres {
         let system = loaded.info.coordinate_system.as_deref();
         report_degrees(&loaded.cloud, system, &["reproject"], progress);
     }
@@ -314,7 +314,8 @@ mod tests {
         let mut metres = degrees();
         let system =
             FileInfo { coordinate_system: Some("EPSG:32632".into()), ..FileInfo::default() };
-        move_to_metres(&mut metres, &mut FileInfo::default(), Some("EPSG:32632"), &NoProgress);
+        move_to_metres(&mut metres, &mut FileInfo::default(), Some("EPSG:32632"), &NoProgress)
+            .unwrap();
         let mut description = SceneDescription::default();
         description.objects_default.preparation.reproject = Some(true);
         let sources =

@@ -1,7 +1,9 @@
 //! Longitudes and latitudes in metres: in degrees, a scan is a needle as high as its heights.
 
 use super::{CoordinateSystem, Place, Unit};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
+use surfel_core::Result;
 use surfel_core::math::{Aabb, DVec3, Vec3, quantile};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
@@ -34,59 +36,43 @@ pub fn report_degrees(
     }
 }
 
-/// Moves the points of a cloud in degrees to metres, to the coordinate system of `others` if these have one, and reports it.
-/// Everything else stays as it is.
+/// Moves the points and stations of a cloud in degrees to metres, to the coordinate system of `others` if these have one,
+/// and reports it. Everything else stays as it is.
+///
+/// # Errors
+///
+/// Fails if cancelled.
 pub fn move_to_metres(
     cloud: &mut PointCloud,
     info: &mut FileInfo,
     others: Option<&str>,
     progress: &dyn Progress,
-) {
-    if let Some(line) = metres_from_degrees(cloud, info, others) {
+) -> Result<()> {
+    if let Some(line) = metres_from_degrees(cloud, info, others, progress)? {
         progress.choice(&line, &["reproject"]);
     }
+    Ok(())
 }
 
-/// Moves the points of a cloud from degrees to the coordinate system of `others` if that has a unit of length, or to
-/// their zone of the Universal Transverse Mercator (UTM) system. Heights stay.
+/// Moves the points and stations of a cloud from degrees to the coordinate system of `others` if that has a unit of
+/// length, or to their zone of the Universal Transverse Mercator (UTM) system. Heights stay.
 ///
-/// Returns a line about it for the user, or `None` if the coordinates are no degrees: the file states no geographic
-/// system, and none without a statement look like it.
+/// Returns a line about it for the user, or `None` if the coordinates are no degrees: the format of the file prescribes
+/// metres, the file states no geographic system, and none without a statement look like it.
 fn metres_from_degrees(
     cloud: &mut PointCloud,
     info: &mut FileInfo,
     others: Option<&str>,
-) -> Option<String> {
-    let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
-    let extent = Extent::of(cloud);
-    if !extent.is_in_degrees(cloud, source.as_ref()) {
-        return None;
+    progress: &dyn Progress,
+) -> Result<Option<String>> {
+    let Some(reprojection) = Reprojection::of(cloud, info, others) else { return Ok(None) };
+    let Some(positions) = reprojection.positions(cloud, progress)? else { return Ok(None) };
+    for station in &mut cloud.stations {
+        station.position = station.position.and_then(|position| reprojection.moved(position));
     }
-    let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
-    let middle = source.place(0.5 * (extent.low + extent.high))?;
-    let is_metric = |system: &CoordinateSystem| {
-        !system.projection.is_geocent() && system.unit() != Unit::Degrees
-    };
-    let of_others = others.and_then(|text| Some((text.to_owned(), CoordinateSystem::parse(text)?)));
-    let (name, target) = match of_others.filter(|(_, system)| is_metric(system)) {
-        Some(found) => found,
-        None => {
-            let name = format!("EPSG:{}", utm_code(middle));
-            let system = CoordinateSystem::parse(&name)?;
-            (name, system)
-        }
-    };
-    let origin = target.position(middle)?.round().with_z(cloud.origin.z);
-    let moved = |position: &Vec3| {
-        let degrees = cloud.origin + position.as_dvec3();
-        if !degrees.is_finite() {
-            return Some(*position);
-        }
-        let found = target.position(source.place(degrees)?)?;
-        Some((found.with_z(degrees.z) - origin).as_vec3())
-    };
-    cloud.positions = cloud.positions.iter().map(moved).collect::<Option<Vec<_>>>()?;
-    cloud.origin = origin;
+    cloud.positions = positions;
+    cloud.origin = reprojection.origin;
+    let Reprojection { middle, name, .. } = reprojection;
     let line = format!(
         "longitudes and latitudes around {:.4}, {:.4} moved to metres of {name}",
         middle.longitude_deg, middle.latitude_deg
@@ -100,7 +86,74 @@ fn metres_from_degrees(
         las,
         ..std::mem::take(info)
     };
-    Some(line)
+    Ok(Some(line))
+}
+
+/// The way of coordinates from degrees to metres.
+struct Reprojection {
+    source: CoordinateSystem,
+    target: CoordinateSystem,
+    /// Name of the target.
+    name: String,
+    /// Middle of the points.
+    middle: Place,
+    /// World coordinates that become the zero of the positions.
+    origin: DVec3,
+}
+
+impl Reprojection {
+    /// Returns the way for a cloud, or `None` if its coordinates are no degrees.
+    fn of(cloud: &PointCloud, info: &FileInfo, others: Option<&str>) -> Option<Self> {
+        let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
+        let extent = Extent::of(cloud);
+        if info.is_in_metres || !extent.is_in_degrees(cloud, source.as_ref()) {
+            return None;
+        }
+        let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
+        let middle = source.place(0.5 * (extent.low + extent.high))?;
+        let is_metric = |system: &CoordinateSystem| {
+            !system.projection.is_geocent() && system.unit() != Unit::Degrees
+        };
+        let of_others =
+            others.and_then(|text| Some((text.to_owned(), CoordinateSystem::parse(text)?)));
+        let (name, target) = match of_others.filter(|(_, system)| is_metric(system)) {
+            Some(found) => found,
+            None => {
+                let name = format!("EPSG:{}", utm_code(middle));
+                let system = CoordinateSystem::parse(&name)?;
+                (name, system)
+            }
+        };
+        let origin = target.position(middle)?.round().with_z(cloud.origin.z);
+        Some(Self { source, target, name, middle, origin })
+    }
+
+    /// Returns a world position in metres, or `None` outside of what the target describes. One that is not finite stays.
+    fn moved(&self, degrees: DVec3) -> Option<DVec3> {
+        if !degrees.is_finite() {
+            return Some(degrees);
+        }
+        let metres = self.target.position(self.source.place(degrees)?)?;
+        Some(metres.with_z(degrees.z))
+    }
+
+    /// Returns the positions of a cloud in metres, or `None` if one lies outside of what the target describes.
+    fn positions(&self, cloud: &PointCloud, progress: &dyn Progress) -> Result<Option<Vec<Vec3>>> {
+        const POINTS_PER_TASK: usize = 1 << 16;
+        progress.begin("move to metres", cloud.len() as u64);
+        let moved = |position: &Vec3| {
+            let metres = self.moved(cloud.origin + position.as_dvec3())?;
+            Some((metres - self.origin).as_vec3())
+        };
+        let tasks = cloud.positions.par_chunks(POINTS_PER_TASK).map(|positions| {
+            progress.check()?;
+            progress.advance(positions.len() as u64);
+            Ok(positions.iter().map(moved).collect::<Option<Vec<Vec3>>>())
+        });
+        let parts = tasks.collect::<Result<Vec<_>>>()?;
+        progress.end();
+        Ok(parts.into_iter().collect::<Option<Vec<_>>>().map(|parts| parts.concat()))
+    }
 }
 
 /// Returns true if the coordinates of a cloud are degrees: its `system` is geographic, or it has none and they look like
@@ -184,6 +237,8 @@ mod tests {
     //! Degrees that are moved, and lengths that are not.
 
     use super::*;
+    use surfel_core::points::ScanStation;
+    use surfel_core::progress::NoProgress;
 
     /// Returns points 1e-4 `scale` apart at an origin.
     fn points(scale: f32, origin: DVec3) -> PointCloud {
@@ -203,13 +258,17 @@ mod tests {
         FileInfo { coordinate_system: Some(system.to_owned()), ..FileInfo::default() }
     }
 
+    fn moved(cloud: &mut PointCloud, info: &mut FileInfo, others: Option<&str>) -> Option<String> {
+        metres_from_degrees(cloud, info, others, &NoProgress).unwrap()
+    }
+
     const MUNICH: DVec3 = DVec3::new(11.57, 48.13, 520.0);
 
     #[test]
     fn degrees_become_metres_of_their_utm_zone() {
         for mut info in [FileInfo::default(), stated("EPSG:4326")] {
             let mut cloud = points(1.0, MUNICH);
-            let line = metres_from_degrees(&mut cloud, &mut info, None).unwrap();
+            let line = moved(&mut cloud, &mut info, None).unwrap();
             assert!(line.ends_with("moved to metres of EPSG:32632"), "{line}");
             assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:32632"));
             let size = Aabb::of_points(cloud.positions.iter().copied()).size();
@@ -228,9 +287,19 @@ mod tests {
     fn degrees_follow_the_system_of_other_files() {
         let mut cloud = points(1.0, MUNICH);
         let mut info = stated("EPSG:4326");
-        metres_from_degrees(&mut cloud, &mut info, Some("EPSG:25833")).unwrap();
+        moved(&mut cloud, &mut info, Some("EPSG:25833")).unwrap();
         assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:25833"));
-        metres_from_degrees(&mut points(1.0, MUNICH), &mut stated("EPSG:4326"), Some("EPSG:4326"));
+        moved(&mut points(1.0, MUNICH), &mut stated("EPSG:4326"), Some("EPSG:4326"));
+    }
+
+    #[test]
+    fn stations_move_with_their_points() {
+        let station = ScanStation { position: Some(MUNICH), ..ScanStation::default() };
+        let mut cloud = PointCloud { stations: vec![station], ..points(1.0, MUNICH) };
+        moved(&mut cloud, &mut stated("EPSG:4326"), None).unwrap();
+        let [first, station] = [cloud.world_position(0), cloud.stations[0].position.unwrap()];
+        assert!(first.with_z(0.0).distance(station.with_z(0.0)) < 0.01, "{first}, {station}");
+        assert_eq!(station.z, MUNICH.z);
     }
 
     #[test]
@@ -238,7 +307,7 @@ mod tests {
         let records = vec![(2112, b"GEOGCS[\"WGS 84\"]\0".to_vec())];
         let las = LasProfile { point_format: 6, projection: records, ..LasProfile::default() };
         let mut info = FileInfo { las: Some(las), ..stated("EPSG:4326") };
-        metres_from_degrees(&mut points(1.0, MUNICH), &mut info, None).unwrap();
+        moved(&mut points(1.0, MUNICH), &mut info, None).unwrap();
         let las = info.las.unwrap();
         assert_eq!((las.point_format, las.projection), (6, vec![]));
     }
@@ -257,10 +326,11 @@ mod tests {
             (1.0, DVec3::ZERO, FileInfo::default()),
             (1.0, MUNICH, stated("EPSG:25832")),
             (1.0, DVec3::new(691_000.0, 5_334_000.0, 520.0), stated("EPSG:4326")),
+            (1.0, MUNICH, FileInfo { is_in_metres: true, ..stated("EPSG:4326") }),
         ] {
             let mut cloud = points(scale, origin);
             let before = cloud.clone();
-            assert_eq!(metres_from_degrees(&mut cloud, &mut info, None), None);
+            assert_eq!(moved(&mut cloud, &mut info, None), None);
             assert!(cloud == before);
         }
     }

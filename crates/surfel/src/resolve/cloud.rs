@@ -57,7 +57,7 @@ pub fn import(
             report_degrees(cloud, system.as_deref(), &[], progress);
         }
         _ if settings.preparation.reproject != Some(false) => {
-            return Ok(with_metres(loaded, options, progress));
+            return with_metres(loaded, options, progress);
         }
         _ => {}
     }
@@ -82,7 +82,7 @@ fn import_from_file(
     } else {
         surfel_formats::load_graph(file, &load_options, progress)
     };
-    let loaded = loaded.map_err(|error| reading_error(error, &settings.preparation))?;
+    let loaded = loaded.map_err(|error| reading_error(file, error, &settings.preparation))?;
     progress.end();
     Ok(loaded)
 }
@@ -92,18 +92,18 @@ fn with_metres(
     (mut graph, mut info): (Graph<PointCloud>, FileInfo),
     options: &ImportOptions,
     progress: &dyn Progress,
-) -> (Graph<PointCloud>, FileInfo) {
+) -> Result<(Graph<PointCloud>, FileInfo)> {
     if let [Geometry::Points(cloud)] = &mut graph.geometries[..] {
         let mut target = options.coordinate_system.as_deref();
         match &options.crs {
-            Some(crs) if is_in_degrees(cloud, Some(crs)) => {
+            Some(crs) if !info.is_in_metres && is_in_degrees(cloud, Some(crs)) => {
                 info.coordinate_system = Some(crs.clone());
             }
             crs => target = crs.as_deref().or(target),
         }
-        move_to_metres(cloud, &mut info, target, progress);
+        move_to_metres(cloud, &mut info, target, progress)?;
     }
-    (graph, info)
+    Ok((graph, info))
 }
 
 /// Takes content in memory as if a file held it.
@@ -219,17 +219,23 @@ fn no_point_kept(
     Error::NoPointKept { files: files.to_vec(), key, filter: filter.to_string(), hint }
 }
 
-/// Returns the error of points that were read under settings; that of a filter names the setting that it is of.
-pub fn reading_error(error: surfel_formats::Error, settings: &PreparationSettings) -> Error {
+/// Returns the error of a file that was read under settings; that of a filter names the file, and the setting that it is
+/// of.
+pub fn reading_error(
+    file: &Path,
+    error: surfel_formats::Error,
+    settings: &PreparationSettings,
+) -> Error {
     let surfel_formats::Error::Core(cause @ surfel_core::Error::UnknownName { found, .. }) = &error
     else {
         return error.into();
     };
     let filters = settings.point_filters().unwrap_or_default();
     let mut filters = filters.into_iter();
+    let text = format!("{}: {}", file.display(), with_nearest(cause));
     match filters.find(|(_, filter)| filter.columns().contains(&found.as_str())) {
-        Some((key, _)) => Error::Unfit(format!("{} [{key}]", with_nearest(cause))),
-        None => error.into(),
+        Some((key, _)) => Error::Unfit(format!("{text} [{key}]")),
+        None => Error::Unfit(text),
     }
 }
 
