@@ -67,9 +67,9 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         let info = if args.summary {
             summarize(file, &header)
         } else {
-            let infos = [(file.as_path(), header)].into();
+            let file_info = [(file.as_path(), &header)];
             // Points are only looked at.
-            MemoryEstimate::from_files(&infos, Some(Subsample::First(0)), 0).check(limit)?;
+            MemoryEstimate::from_files(file_info, Some(Subsample::First(0)), 0).check(limit)?;
             let loaded = surfel_formats::load(file, &options, report)?;
             describe(file, &loaded, report)?
         };

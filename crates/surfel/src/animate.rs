@@ -15,11 +15,14 @@ use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 use surfel_formats::{Movie, MovieOptions};
 
+/// Maximum number of frames that follows from the length of the movements.
+const MAX_FRAMES: f64 = 1e6;
+
 /// Returns the number of frames of a description's movie.
 ///
 /// # Errors
 ///
-/// Fails if nothing moves and no number is given.
+/// Fails if nothing moves and no number is given, and for movements that take very long.
 pub(crate) fn frame_count(
     description: &SceneDescription,
     animated_secs: f64,
@@ -33,7 +36,15 @@ pub(crate) fn frame_count(
         let text = "nothing moves; set turntable, or frames for a still movie";
         return Err(Invalid::at("frames", text));
     }
-    Ok((duration * output.fps()).round().clamp(1.0, 1e6) as u32)
+    let n_frames = (duration * output.fps()).round().max(1.0);
+    if MAX_FRAMES < n_frames {
+        let text = format!(
+            "the movements take {duration} s, which are {n_frames} frames, expected at most {MAX_FRAMES}; set frames, or \
+             times in seconds"
+        );
+        return Err(Invalid::at("frames", text));
+    }
+    Ok(n_frames as u32)
 }
 
 /// Returns how a description's movie becomes a file; the number of frames and the fingerprint follow later.
@@ -316,6 +327,14 @@ mod tests {
     use surfel_core::math::Vec3;
     use surfel_core::points::PointCloud;
     use surfel_core::progress::NoProgress;
+
+    #[test]
+    fn movements_of_gps_seconds_are_no_movie_of_a_million_frames() {
+        let description = SceneDescription::default();
+        assert_eq!(frame_count(&description, 2.0).unwrap(), 50);
+        let error = frame_count(&description, 400_000.0).unwrap_err().to_string();
+        assert!(error.contains("10000000 frames, expected at most 1000000"), "{error}");
+    }
 
     /// Returns the description of a square of points in memory, whose colours have this brightness.
     fn square(brightness: u16) -> SceneDescription {

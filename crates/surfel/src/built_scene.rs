@@ -118,11 +118,14 @@ pub(crate) fn planes_before(room: Option<&Room>, camera: &Camera) -> Vec<ClipPla
 
 /// Returns for each geometry the index that each of its points had when it was read.
 pub(crate) fn source_indices(graph: &Graph) -> Vec<Vec<u32>> {
-    let indices = graph.geometries.iter().map(|geometry| match geometry {
+    graph.geometries.iter().map(source_indices_of).collect()
+}
+
+fn source_indices_of(geometry: &Geometry) -> Vec<u32> {
+    match geometry {
         Geometry::Points(points) => points.cloud().source_indices.clone().unwrap_or_default(),
         Geometry::Triangles(_) => Vec::new(),
-    });
-    indices.collect()
+    }
 }
 
 /// Returns for each instance the index that each of its points had when it was read, of the indices for each geometry.
@@ -213,8 +216,14 @@ impl BuiltScene {
             if !sequence.seek(time_secs, &mut self.graph, self.up, progress)? {
                 continue;
             }
+            self.source_indices.resize(self.graph.geometries.len(), Vec::new());
             for geometry_idx in sequence.slots.geometries.iter().copied() {
-                self.flat.replace(geometry_idx, &self.graph.geometries[geometry_idx], progress)?;
+                let geometry = &self.graph.geometries[geometry_idx];
+                self.source_indices[geometry_idx] = source_indices_of(geometry);
+                if let Err(error) = self.flat.replace(geometry_idx, geometry, progress) {
+                    sequence.forget_file();
+                    return Err(error.into());
+                }
             }
             self.flat.materials.clone_from(&self.graph.materials);
             expose_materials(&mut self.flat.materials, self.stops);
@@ -291,10 +300,12 @@ mod tests {
     //! The choices that a built scene lists.
 
     use super::*;
+    use crate::description::ObjectDescription;
     use crate::memory_files::MemoryContent;
     use crate::resolve;
     use std::path::Path;
     use std::sync::Arc;
+    use std::sync::atomic::{AtomicI64, Ordering};
     use surfel_core::points::PointCloud;
 
     #[test]
@@ -313,5 +324,61 @@ mod tests {
         assert_eq!(n_choices("sun", "auto"), 1);
         assert_eq!(n_choices("none", "auto"), 0);
         assert_eq!(n_choices("sun", "1"), 0);
+    }
+
+    /// Cancels work at one of its checks.
+    struct CancelAt(AtomicI64);
+
+    impl Progress for CancelAt {
+        fn is_cancelled(&self) -> bool {
+            self.0.fetch_sub(1, Ordering::Relaxed) <= 0
+        }
+    }
+
+    /// A sequence of a plane of points, and of the same points in reverse order.
+    fn sequence() -> BuiltScene {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let mut object = ObjectDescription::new("memory:a");
+        object.files.push("memory:b".into());
+        object.fps = Some(1.0);
+        let mut description = SceneDescription::default();
+        description.objects.push(object);
+        let positions: Vec<Vec3> = (0..400).map(corner).collect();
+        let reversed = positions.iter().rev().copied().collect();
+        for (name, positions) in [("memory:a", positions), ("memory:b", reversed)] {
+            let cloud = Arc::new(PointCloud::from_positions(positions));
+            description.memory.insert(name, MemoryContent::Points(cloud, None));
+        }
+        resolve(&description, &NoProgress).unwrap().build(&NoProgress).unwrap()
+    }
+
+    fn point_at(scene: &BuiltScene, [x, y]: [f64; 2]) -> Option<u32> {
+        let ray = [x, y, 5.0, 0.0, 0.0, -1.0];
+        scene.cast_rays(&[ray]).unwrap()[0].as_ref()?.point
+    }
+
+    #[test]
+    fn points_of_each_file_of_a_sequence_have_their_own_indices() {
+        let mut scene = sequence();
+        for (time_secs, expected) in [(0.0, 43), (1.0, 356), (0.0, 43)] {
+            scene.seek(time_secs, &NoProgress).unwrap();
+            assert_eq!(point_at(&scene, [3.0, 2.0]), Some(expected), "{time_secs}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_a_sequence_whose_reading_was_cancelled_is_read_again() {
+        let mut scene = sequence();
+        let n_enough = i64::MAX;
+        let all = CancelAt(AtomicI64::new(n_enough));
+        scene.seek(1.0, &all).unwrap();
+        let n_checks = n_enough - all.0.load(Ordering::Relaxed);
+        // The last checks are those of the tree.
+        for n_passed in [0, n_checks / 2, n_checks - 3, n_checks - 2, n_checks - 1] {
+            scene.seek(0.0, &NoProgress).unwrap();
+            assert!(scene.seek(1.0, &CancelAt(AtomicI64::new(n_passed))).is_err(), "{n_passed}");
+            scene.seek(1.0, &NoProgress).unwrap();
+            assert_eq!(point_at(&scene, [3.0, 2.0]), Some(356), "{n_passed}");
+        }
     }
 }

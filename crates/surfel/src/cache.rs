@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::locks::lock_unless_cancelled;
-use crate::progress_log::{Choice, ProgressLog};
+use crate::progress_log::{ProgressLog, Records};
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,8 +23,8 @@ type Entries<T> = VecDeque<Entry<T>>;
 struct Entry<T> {
     key: u64,
     value: Arc<T>,
-    /// The choices that were made along with the result.
-    choices: Arc<[Choice]>,
+    /// The lines that were reported while the result was made.
+    records: Arc<Records>,
 }
 
 const CAPACITY: usize = 2;
@@ -37,7 +37,7 @@ impl<T> Default for Lru2<T> {
 
 impl<T> Lru2<T> {
     /// Returns the result for `key`, made now unless it is known. One result is made at a time: several callers that
-    /// want the same wait for one of them. Each caller hears of the choices that were made with it.
+    /// want the same wait for one of them. Each caller hears what was reported while it was made.
     pub fn get_or_make(
         &self,
         key: u64,
@@ -56,8 +56,8 @@ impl<T> Lru2<T> {
         self.drop_oldest();
         let log = ProgressLog::new(progress);
         let value = Arc::new(make(&log)?);
-        let choices = log.into_records().choices.into();
-        self.entries().push_back(Entry { key, value: value.clone(), choices });
+        let records = log.into_records().into();
+        self.entries().push_back(Entry { key, value: value.clone(), records });
         Ok(value)
     }
 
@@ -72,15 +72,15 @@ impl<T> Lru2<T> {
         self.entries().iter().any(|entry| entry.key == key)
     }
 
-    /// Returns the result for `key` if it is known, which is the latest then, and reports its choices.
+    /// Returns the result for `key` if it is known, which is the latest then, and reports its lines.
     fn find(&self, key: u64, progress: &dyn Progress) -> Option<Arc<T>> {
         let mut entries = self.entries();
         let i = entries.iter().position(|entry| entry.key == key)?;
         let found = entries.remove(i)?;
-        let (value, choices) = (found.value.clone(), found.choices.clone());
+        let (value, records) = (found.value.clone(), found.records.clone());
         entries.push_back(found);
         drop(entries);
-        choices.iter().for_each(|choice| choice.report(progress));
+        records.report(progress);
         Some(value)
     }
 
@@ -155,12 +155,13 @@ mod tests {
     }
 
     #[test]
-    fn known_results_come_with_the_choices_that_were_made_with_them() {
+    fn known_results_come_with_the_lines_that_were_reported_with_them() {
         let (inner, outer) = (Lru2::<i32>::default(), Lru2::<i32>::default());
-        let choices = |key: u64| {
+        let lines = |key: u64| {
             let log = ProgressLog::new(&NoProgress);
             let make_inner = |progress: &dyn Progress| {
                 progress.choice("radii of 12 neighbours", &["radius"]);
+                progress.warning("has no effect", &["normals"]);
                 Ok(1)
             };
             let make_outer = |progress: &dyn Progress| {
@@ -169,12 +170,12 @@ mod tests {
                 Ok(*inner)
             };
             outer.get_or_make(key, &log, make_outer).unwrap();
-            let choices = log.into_records().choices.into_iter();
-            choices.map(|choice| choice.to_string()).collect::<Vec<_>>()
+            log.into_records().into_lines()
         };
         for key in [1, 1, 2, 2, 1] {
-            let expected = ["radii of 12 neighbours [radius]".to_owned(), format!("tree {key}")];
-            assert_eq!(choices(key), expected);
+            let tree = format!("tree {key}");
+            let expected = ["radii of 12 neighbours [radius]", &tree, "has no effect [normals]"];
+            assert_eq!(lines(key), expected);
         }
     }
 

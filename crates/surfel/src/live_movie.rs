@@ -43,6 +43,9 @@ pub fn movie(
     let quiet = CancelOnly(progress);
     let n_frames = movie_length(scene, description)?;
     let mut view = view_at(scene, description, 0.0, &quiet)?;
+    // One exposure is chosen for all frames.
+    let mut exposed = description.clone();
+    exposed.light.exposure = view.description.light.exposure;
     let image = image_options(description, view.flat.origin);
     let options = MovieOptions { n_frames, image, ..movie_options(description) };
     let moves_objects = 0.0 < scene.loaded().duration_secs();
@@ -50,7 +53,7 @@ pub fn movie(
     let (camera, lights, lamps) = (*camera, lights.clone(), punctual_lights.clone());
     let written = write_movie(output, &options, false, progress, |time_secs| {
         if moves_objects {
-            view = view_at(scene, description, time_secs, &quiet)?;
+            view = view_at(scene, &exposed, time_secs, &quiet)?;
         } else {
             view.flat.camera = camera_at(camera, &view, description, time_secs)?;
             view.flat.lights.clone_from(&lights);

@@ -9,7 +9,7 @@ use surfel_formats::FileInfo;
 
 /// Content in memory by the names that the files of a description give it. Copies share it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MemoryFiles(BTreeMap<PathBuf, MemoryContent>);
+pub struct MemoryFiles(Arc<BTreeMap<PathBuf, MemoryContent>>);
 
 /// A cloud or a mesh in memory. Content is equal if it is the same.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub struct FileContent {
 impl MemoryFiles {
     /// Adds content under a name, in place of what had it.
     pub fn insert(&mut self, name: impl Into<PathBuf>, content: MemoryContent) {
-        self.0.insert(name.into(), content);
+        Arc::make_mut(&mut self.0).insert(name.into(), content);
     }
 
     /// Returns true if content has this name.
@@ -55,7 +55,7 @@ impl MemoryFiles {
 
     /// Adds the content of another, in place of what had its names.
     pub(crate) fn extend(&mut self, other: Self) {
-        self.0.extend(other.0);
+        Arc::make_mut(&mut self.0).extend(Arc::unwrap_or_clone(other.0));
     }
 }
 
@@ -68,6 +68,11 @@ impl MemoryContent {
             Self::File(file) => return file.graph.clone(),
         };
         Graph::from_geometry(geometry, Material::MATTE)
+    }
+
+    /// Returns true for content that is more than one cloud or mesh.
+    pub(crate) fn is_scene(&self) -> bool {
+        matches!(self, Self::File(file) if 1 < file.graph.nodes.len())
     }
 
     /// Returns a text that changes with the clouds and meshes, their places and materials.

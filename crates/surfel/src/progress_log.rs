@@ -13,14 +13,6 @@ pub struct Choice {
     pub keys: Vec<String>,
 }
 
-impl Choice {
-    /// Reports the choice to those who did not hear when it was made.
-    pub(crate) fn report(&self, progress: &dyn Progress) {
-        let keys: Vec<&str> = self.keys.iter().map(String::as_str).collect();
-        progress.choice(&self.reason, &keys);
-    }
-}
-
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&with_keys(&self.reason, &self.keys))
@@ -54,6 +46,22 @@ pub struct Records {
 }
 
 impl Records {
+    /// Reports all lines to those who did not hear them when they were reported first.
+    pub(crate) fn report(&self, progress: &dyn Progress) {
+        fn texts(keys: &[String]) -> Vec<&str> {
+            keys.iter().map(String::as_str).collect()
+        }
+        for line in &self.notes {
+            progress.note(line);
+        }
+        for Choice { reason, keys } in &self.choices {
+            progress.choice(reason, &texts(keys));
+        }
+        for Warning { line, keys } in &self.warnings {
+            progress.warning(line, &texts(keys));
+        }
+    }
+
     /// Returns all lines: notes, choices, then warnings.
     pub fn into_lines(self) -> Vec<String> {
         let choices = self.choices.iter().map(ToString::to_string);

@@ -2,7 +2,7 @@
 
 use crate::cache::hash_of;
 use crate::description::{
-    LightKind, ObjectDescription, PreparationSettings, SceneDescription, write_parts,
+    LightKind, ObjectDescription, PreparationSettings, SceneDescription, twins, write_parts,
 };
 use crate::resolve::AutoSettings;
 use serde_json::{Value, json};
@@ -35,9 +35,8 @@ pub fn filter_key(description: &SceneDescription) -> u64 {
 
 /// A hash of everything that decides which files are read as one, which apart, and which geometries are shared.
 pub fn grouping_key(description: &SceneDescription) -> u64 {
-    let objects = &description.objects;
-    let twin = |i: usize| objects[..i].iter().position(|other| other.has_same_content(&objects[i]));
-    let objects = objects.iter().enumerate().map(|(i, object)| json!([object.files, twin(i)]));
+    let objects = description.objects.iter().zip(twins(&description.objects));
+    let objects = objects.map(|(object, twin)| json!([object.files, twin]));
     // Of several clouds, those with a material of their own are apart.
     let choices = description.materials.choices();
     let has_material = |file: &&PathBuf| choices.iter().any(|choice| choice.names(file));

@@ -249,10 +249,10 @@ fn estimate_memory(args: &Args, description: &SceneDescription) -> anyhow::Resul
     let info = surfel_formats::inspect(&args.cloud)?;
     // Two rays and what is found along them take a little more than a pixel with its layers.
     let n_rays = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
-    let infos = [(args.cloud.as_path(), info)].into();
+    let file_info = [(args.cloud.as_path(), &info)];
     let subsample = description.objects_default.preparation.subsample;
     let bytes = n_rays * PIXEL_WITH_LAYERS;
-    Ok(MemoryEstimate::from_files(&infos, subsample, bytes).with_surfaces_of(description))
+    Ok(MemoryEstimate::from_files(file_info, subsample, bytes).with_surfaces_of(description))
 }
 
 fn load_unbuilt(

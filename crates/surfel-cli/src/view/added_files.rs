@@ -13,7 +13,7 @@ use surfel::memory_files::{FileContent, MemoryContent};
 use surfel::progress_log::ProgressLog;
 use surfel::resolve::can_be_colored;
 use surfel_core::bytes::readable;
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{Morph, PointCloud, Skin, Values};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{Animation, Geometry, Graph, Mesh};
@@ -129,7 +129,7 @@ impl PageFile {
 
     /// The path by which a description names the file.
     fn path(&self) -> PathBuf {
-        Path::new(&format!("{FOLDER}{}", self.id)).join(&self.name)
+        PathBuf::from(format!("{FOLDER}{}/{}", self.id, self.name))
     }
 
     /// Adds the file to a description, as its last object.
@@ -196,7 +196,10 @@ pub fn words(description: &SceneDescription) -> Vec<String> {
 
 /// Returns the text of a scene file in which added files lie in the folder of the file.
 pub fn with_relative_paths(text: &str) -> String {
-    without_ids(&text.replace(&absolute_text(Path::new(FOLDER)), FOLDER))
+    let folder = absolute_text(Path::new(FOLDER));
+    // JSON and TOML escape backslashes.
+    let escaped = folder.replace('\\', r"\\");
+    without_ids(&text.replace(&folder, FOLDER).replace(&escaped, FOLDER))
 }
 
 /// Returns a text in which added files are named without their ids.
@@ -240,7 +243,9 @@ fn n_bytes_of(graph: &Graph<PointCloud>) -> u64 {
         Geometry::Triangles(mesh) => mesh_bytes(mesh),
     });
     let textures = graph.textures.iter().map(|texture| size_of_val(&texture.texels[..]));
-    geometries.chain(textures).sum::<usize>() as u64
+    let primitives = graph.nodes.iter().map(|node| size_of_val(&node.primitives[..]));
+    let nodes = size_of_val(&graph.nodes[..]);
+    geometries.chain(textures).chain(primitives).chain([nodes]).sum::<usize>() as u64
 }
 
 fn cloud_bytes(cloud: &PointCloud) -> usize {
@@ -252,21 +257,38 @@ fn cloud_bytes(cloud: &PointCloud) -> usize {
         Values::F64(values) => size_of_val(&values[..]),
     });
     size_of_val(&cloud.positions[..])
-        + cloud.normals.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + cloud.radii.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + cloud.colors.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + cloud.intensity.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + cloud.classification.as_ref().map_or(0, |column| size_of_val(&column[..]))
+        + column_bytes(&cloud.normals)
+        + column_bytes(&cloud.radii)
+        + column_bytes(&cloud.colors)
+        + column_bytes(&cloud.intensity)
+        + column_bytes(&cloud.classification)
         + scalars.sum::<usize>()
+        + deformation_bytes(&cloud.morphs, cloud.skin.as_ref())
 }
 
 fn mesh_bytes(mesh: &Mesh) -> usize {
     size_of_val(&mesh.positions[..])
         + size_of_val(&mesh.triangles[..])
-        + mesh.normals.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + mesh.tangents.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + mesh.colors.as_ref().map_or(0, |column| size_of_val(&column[..]))
-        + mesh.uvs.iter().flatten().map(|column| size_of_val(&column[..])).sum::<usize>()
+        + column_bytes(&mesh.normals)
+        + column_bytes(&mesh.tangents)
+        + column_bytes(&mesh.colors)
+        + mesh.uvs.iter().map(column_bytes).sum::<usize>()
+        + deformation_bytes(&mesh.morphs, mesh.skin.as_ref())
+}
+
+fn deformation_bytes(morphs: &[Morph], skin: Option<&Skin>) -> usize {
+    let of_morph = |morph: &Morph| {
+        size_of_val(&morph.positions[..])
+            + column_bytes(&morph.normals)
+            + column_bytes(&morph.tangents)
+            + column_bytes(&morph.radii)
+    };
+    let of_skin = |skin: &Skin| size_of_val(&skin.joints[..]) + size_of_val(&skin.weights[..]);
+    morphs.iter().map(of_morph).sum::<usize>() + skin.map_or(0, of_skin)
+}
+
+fn column_bytes<T>(column: &Option<Vec<T>>) -> usize {
+    column.as_ref().map_or(0, |column| size_of_val(&column[..]))
 }
 
 #[cfg(test)]

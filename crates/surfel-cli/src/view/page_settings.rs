@@ -128,9 +128,8 @@ pub fn from_file(
     let rejected = |error: Invalid| Error::invalid_request(error.in_file(name).to_string());
     let is_json = name.to_ascii_lowercase().ends_with(".json");
     let table = parse_table(text, is_json).map_err(rejected)?;
-    let is_served = |file: &str| {
-        served.iter().any(|known| known == file || known.ends_with(&format!("/{file}")))
-    };
+    let is_served =
+        |file: &str| served.iter().any(|known| known == file || Path::new(known).ends_with(file));
     // Before the objects are read: a pattern would list the files of a folder.
     if let Some(file) = object_files(&table).into_iter().find(|file| !is_served(file)) {
         return Err(rejected(Invalid::at("object", format!("`{file}` is not shown here"))));

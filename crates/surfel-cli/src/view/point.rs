@@ -34,10 +34,9 @@ pub fn describe(
         FlatGeometry::Mesh(_) => json!("triangle"),
     };
     facts["object"] = json!(name(graph, instance.node_idx as usize));
-    let Some((cloud, index)) = source(loaded, trees, instance, picked.primitive_idx) else {
-        return facts;
-    };
+    let Some(index) = source_index(trees, instance, picked.primitive_idx) else { return facts };
     facts["index"] = json!(index);
+    let Some(cloud) = source(loaded, instance) else { return facts };
     let world = graph.world_from_nodes()[instance.node_idx as usize];
     if let Some(found) = position(cloud, index, &world, &loaded.file_info()) {
         facts["position"] = json!(found.position);
@@ -60,25 +59,26 @@ pub fn locate(
     let (info, world_from_nodes) = (loaded.file_info(), graph.world_from_nodes());
     let located = points.iter().map(|point| {
         let instance = flat.instances.get(point.instance_idx as usize)?;
-        let (cloud, index) = source(loaded, trees, instance, point.primitive_idx)?;
+        let index = source_index(trees, instance, point.primitive_idx)?;
+        let cloud = source(loaded, instance)?;
         let world = &world_from_nodes[instance.node_idx as usize];
         position(cloud, index, world, &info).map(|found| found.position)
     });
     located.collect()
 }
 
-/// Returns the cloud as it was read in which a point of an instance is, and its index there.
-fn source<'l>(
-    loaded: &'l LoadedScene,
-    trees: &SceneTrees,
-    instance: &Instance,
-    primitive_idx: u32,
-) -> Option<(&'l PointCloud, usize)> {
+/// Returns the index that a point of an instance has in its file; none of a triangle.
+fn source_index(trees: &SceneTrees, instance: &Instance, primitive_idx: u32) -> Option<usize> {
+    let indices = &trees.source_indices[instance.graph_geometry_idx as usize];
+    indices.get(primitive_idx as usize).map(|index| *index as usize)
+}
+
+/// Returns the cloud of an instance as it was read; none of a sequence, whose other files are read anew for each time.
+fn source<'l>(loaded: &'l LoadedScene, instance: &Instance) -> Option<&'l PointCloud> {
     let geometry = instance.graph_geometry_idx as usize;
-    let index = *trees.source_indices[geometry].get(primitive_idx as usize)?;
     match loaded.graph.geometries.get(geometry)? {
-        Geometry::Points(cloud) => Some((cloud, index as usize)),
-        Geometry::Triangles(_) => None,
+        Geometry::Points(cloud) if !loaded.is_of_sequence(geometry) => Some(cloud),
+        _ => None,
     }
 }
 

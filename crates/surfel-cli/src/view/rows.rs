@@ -1,9 +1,11 @@
 //! The rows of a page's list of files and objects: their names, and what descriptions call them.
 
 use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
-use surfel::description::{MaterialChoice, ObjectOverride};
+use surfel::description::{MaterialChoice, ObjectOverride, names_of};
 use surfel::file_names::file_name;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
@@ -30,13 +32,20 @@ impl Rows {
         let objects = startup.objects.iter();
         let objects = objects.map(|object| (object.name().to_owned(), object.names()));
         let all: Vec<(String, Vec<PathBuf>)> = files.chain(objects).collect();
+        // Number of rows that each name means.
+        let mut n_called: BTreeMap<&OsStr, usize> = BTreeMap::new();
+        for (_, known_as) in &all {
+            let names: BTreeSet<&OsStr> = known_as.iter().flat_map(|file| names_of(file)).collect();
+            names.into_iter().for_each(|name| *n_called.entry(name).or_default() += 1);
+        }
         let mut rows: Vec<Row> = Vec::new();
+        let mut taken: BTreeSet<String> = BTreeSet::new();
         for (own_name, known_as) in &all {
-            let is_shared = 1 < all.iter().filter(|(_, others)| calls(own_name, others)).count();
+            let is_shared = n_called.get(OsStr::new(own_name)).is_some_and(|n| 1 < *n);
             let path = known_as[0].display().to_string();
             let target = if is_shared { path } else { own_name.clone() };
-            let taken: Vec<String> = rows.iter().map(|row| row.name.clone()).collect();
-            let name = numbered_name(own_name, |name| taken.iter().any(|other| other == name));
+            let name = numbered_name(own_name, |name| taken.contains(name));
+            taken.insert(name.clone());
             rows.push(Row { name, target, known_as: known_as.clone() });
         }
         Self(rows)
@@ -88,12 +97,6 @@ pub fn name_by_rows(startup: &mut SceneDescription, rows: &Rows) {
         });
         renamed.collect()
     });
-}
-
-/// Returns true if a name means what is known by these names: by a path, its name, or its name without extension.
-fn calls(name: &str, known_as: &[PathBuf]) -> bool {
-    let one = ObjectOverride { target: name.to_owned(), key: String::new(), value: Value::Null };
-    known_as.iter().any(|file| one.names_file(file))
 }
 
 /// The name, with a number before its extension if it, or it without extension, means one of `taken` too.
@@ -155,7 +158,7 @@ mod tests {
     #[test]
     fn a_name_may_mean_several_rows() {
         let rows = rows(&["/a/scan.laz", "/b/scan.laz"]);
-        let meant = |name: &str| rows.meant(|file| calls(name, &[file.to_owned()]));
+        let meant = |name: &str| rows.meant(|file| names_of(file).any(|own| own == name));
         assert_eq!(meant("scan"), ["scan.laz", "scan (2).laz"]);
         assert_eq!(meant("/b/scan.laz"), ["scan (2).laz"]);
         assert!(meant("unknown").is_empty());

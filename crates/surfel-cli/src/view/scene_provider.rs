@@ -308,11 +308,13 @@ impl SceneProvider for FileSceneProvider {
 
     fn initial_settings(&self, width: u32, height: u32) -> SettingsMap {
         // Choosing a camera takes as long as all else that a page waits for, and most pages have one size.
-        let mut known = self.initial_settings.lock().unwrap_or_else(PoisonError::into_inner);
-        let of_size = known.take().filter(|(size, _)| *size == (width, height));
-        let settings = of_size.map(|(_, settings)| settings);
-        let settings = settings.unwrap_or_else(|| self.choose_initial_settings(width, height));
-        *known = Some(((width, height), settings.clone()));
+        let known = || self.initial_settings.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_size = known().clone().filter(|(size, _)| *size == (width, height));
+        if let Some((_, settings)) = of_size {
+            return settings;
+        }
+        let settings = self.choose_initial_settings(width, height);
+        *known() = Some(((width, height), settings.clone()));
         settings
     }
 

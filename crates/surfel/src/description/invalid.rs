@@ -17,6 +17,15 @@ pub struct Invalid {
     pub message: String,
 }
 
+/// Returns a text that fits into a message.
+fn shorten(text: &str) -> String {
+    const MAX_LENGTH: usize = 200;
+    match text.char_indices().nth(MAX_LENGTH) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 impl Invalid {
     /// An error whose path and value are added on the way out.
     pub fn new(message: impl Into<String>) -> Self {
@@ -31,7 +40,7 @@ impl Invalid {
     /// Adds the value that was found, unless one is known.
     #[must_use]
     pub fn found(mut self, value: &Value) -> Self {
-        self.found.get_or_insert_with(|| value.to_string());
+        self.found.get_or_insert_with(|| shorten(&value.to_string()));
         self
     }
 
@@ -81,3 +90,17 @@ impl fmt::Display for Invalid {
 }
 
 impl std::error::Error for Invalid {}
+
+#[cfg(test)]
+mod tests {
+    //! Values in messages.
+
+    use super::*;
+
+    #[test]
+    fn long_values_are_cut() {
+        let message = |n: usize| Invalid::new("expected less").found(&vec![1; n].into()).reason();
+        assert_eq!(message(2), "found [1,1], expected less");
+        assert!(message(100_000).len() < 300, "{}", message(100_000));
+    }
+}

@@ -5,6 +5,7 @@ use super::keys::{KeyedSettings, settings};
 use super::rule::{Checked, Flag, POSITIVE, Rule, from_core, number};
 use super::{Invalid, read_table, write_table};
 use serde_json::{Map, Value, json};
+use std::ffi::OsStr;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::scene::{AlphaMode, Material};
@@ -168,10 +169,14 @@ impl MaterialChoice {
     }
 }
 
-/// Returns true if a name means a file or object: by its path, its name, or its name without extension.
+/// Returns true if a name means a file or object.
 pub(super) fn is_named(file: &Path, name: &str) -> bool {
-    let parts = [Some(file.as_os_str()), file.file_name(), file.file_stem()];
-    parts.into_iter().flatten().any(|part| part == name)
+    names_of(file).any(|own| own == name)
+}
+
+/// Returns the names that mean a file or object: its path, its name, and its name without extension.
+pub fn names_of(file: &Path) -> impl Iterator<Item = &OsStr> {
+    [Some(file.as_os_str()), file.file_name(), file.file_stem()].into_iter().flatten()
 }
 
 /// Text, a table, or a list of both.

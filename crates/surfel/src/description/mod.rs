@@ -42,10 +42,10 @@ pub use invalid::Invalid;
 pub use keys::{Key, KeyedSettings};
 pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
-pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
+pub use material::{MaterialChoice, MaterialDescription, MaterialSettings, names_of};
 pub use measurement::{Measurement, MeasurementKind};
 pub use named_view::{NamedView, ViewSettings};
-pub use object::{ObjectDescription, Placement, Rotation};
+pub use object::{ObjectDescription, Placement, Rotation, twins};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{
     ColorSettings, ObjectSettings, PreparationSettings, READ_ONCE, SurfaceSettings,

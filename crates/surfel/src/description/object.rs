@@ -8,6 +8,7 @@ use super::{
     Invalid, ObjectSettings, read_value, take_normalized, unknown_key, write_parts, write_table,
 };
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel_core::math::{DAffine3, DQuat, DVec3};
 use surfel_core::scene::Transform;
@@ -216,6 +217,21 @@ fn affine(rows: [f64; 16]) -> DAffine3 {
     DAffine3::from_cols(column(0), column(1), column(2), column(3))
 }
 
+/// Returns for each object the index of the first one before it that holds the same geometry, if there is one: the same
+/// files with the same settings are held once.
+pub fn twins(objects: &[ObjectDescription]) -> Vec<Option<usize>> {
+    let mut first_of: BTreeMap<&[PathBuf], Vec<usize>> = BTreeMap::new();
+    let twins = objects.iter().enumerate().map(|(i, object)| {
+        let firsts = first_of.entry(&object.files).or_default();
+        let twin = firsts.iter().copied().find(|first| objects[*first].has_same_content(object));
+        if twin.is_none() {
+            firsts.push(i);
+        }
+        twin
+    });
+    twins.collect()
+}
+
 impl ObjectDescription {
     /// An object that shows one file where its coordinates say.
     pub fn new(file: impl Into<PathBuf>) -> Self {
@@ -234,7 +250,7 @@ impl ObjectDescription {
     }
 
     /// Returns true if both hold the same geometry, at whatever place.
-    pub fn has_same_content(&self, other: &Self) -> bool {
+    fn has_same_content(&self, other: &Self) -> bool {
         let has_same_rate = self.files.len() == 1 || self.fps() == other.fps();
         self.files == other.files
             && self.merge() == other.merge()

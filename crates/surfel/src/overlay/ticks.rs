@@ -10,7 +10,9 @@ pub(super) fn round_step(limit: f64) -> f64 {
 
 /// Returns the round numbers from `low` to `high`, at most about `n` of them, each with its text.
 pub(super) fn ticks(low: f64, high: f64, n: usize) -> Vec<(f64, String)> {
-    if !(low < high && (high - low).is_finite()) {
+    // Powers of ten below the least normal number round to zero.
+    let is_range = f64::MIN_POSITIVE * 1e6 <= high - low && (high - low).is_finite();
+    if !is_range {
         return if low.is_finite() { vec![(low, number(low, 6))] } else { Vec::new() };
     }
     let at_least = (high - low) / n.max(1) as f64;
@@ -64,6 +66,8 @@ mod tests {
         assert_eq!(texts(-5.0, 5.0), ["-4", "-2", "0", "2", "4"]);
         assert_eq!(texts(1031.2, 1034.9), ["1032", "1033", "1034"]);
         assert_eq!(texts(2.0, 2.0), ["2"]);
+        assert_eq!(texts(0.0, 5e-324), ["0"]);
+        assert_eq!(texts(0.0, 1e-300).len(), 6);
         assert_eq!(texts(f64::NAN, 1.0), [] as [&str; 0]);
         assert_eq!(texts(0.0, f64::INFINITY), ["0"]);
     }

@@ -3,7 +3,7 @@
 use super::memory::{MemoryEstimate, PIXEL, PIXEL_WITH_LAYERS, n_points};
 use super::render_settings;
 use super::sequence::is_streamed;
-use crate::description::{Invalid, ObjectDescription, SceneDescription};
+use crate::description::{Invalid, ObjectDescription, SceneDescription, twins};
 use crate::error::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -30,30 +30,37 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
         Some(content) => Ok((file, content.info())),
         None => Ok((file, surfel_formats::inspect(file)?)),
     });
-    let mut infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
-    for object in objects.filter(|object| 1 < object.files.len()) {
+    let infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
+    let mut held: Vec<&PathBuf> = description.files.iter().collect();
+    for (object, twin) in objects.zip(twins(&description.objects)) {
         let settings = object.settings.over(&description.objects_default);
-        if is_streamed(object, &settings)? {
-            keep_largest_frame(&mut infos, object);
+        if twin.is_some() {
+            continue;
+        }
+        if is_streamed(object, &settings, &description.memory)? {
+            held.extend(largest_frame(&infos, object));
+        } else {
+            held.extend(&object.files);
         }
     }
+    let held = held.into_iter().map(|file| (file.as_path(), &infos[file.as_path()]));
     let settings = &description.objects_default.preparation;
-    let estimate =
-        MemoryEstimate::from_files(&infos, settings.subsample, picture_bytes(description))
-            .with_surfaces_of(description);
+    let estimate = MemoryEstimate::from_files(held, settings.subsample, picture_bytes(description))
+        .with_surfaces_of(description);
     let known = if settings.filters_points() { estimate.without_points() } else { estimate };
     known.check(description.run.memory_limit)
 }
 
-/// Leaves the largest file of a streamed sequence.
-fn keep_largest_frame(infos: &mut BTreeMap<&Path, FileInfo>, object: &ObjectDescription) {
+/// Returns the largest file of a streamed sequence.
+fn largest_frame<'o>(
+    infos: &BTreeMap<&Path, FileInfo>,
+    object: &'o ObjectDescription,
+) -> Option<&'o PathBuf> {
     let size = |file: &&PathBuf| {
-        let info = infos.get(file.as_path())?;
-        Some(info.n_triangles.unwrap_or_else(|| n_points(file, info)))
+        let info = &infos[file.as_path()];
+        info.n_triangles.unwrap_or_else(|| n_points(file, info))
     };
-    let largest = object.files.iter().max_by_key(size).cloned();
-    let others = object.files.iter().filter(|file| Some(*file) != largest.as_ref());
-    others.for_each(|file| _ = infos.remove(file.as_path()));
+    object.files.iter().max_by_key(size)
 }
 
 /// Fails if a material is for a file or an object that is not there.

@@ -2,7 +2,6 @@
 
 use crate::description::SceneDescription;
 use crate::error::{Error, Result};
-use std::collections::BTreeMap;
 use std::path::Path;
 use surfel_core::bytes::readable;
 use surfel_core::flat::{MAX_GAUSSIAN_BYTES, PointBlock, max_field_bytes};
@@ -63,18 +62,20 @@ const LINE: u64 = 30;
 
 impl MemoryEstimate {
     /// Estimates from the headers of files, without reading their points, beside the bytes of a picture.
-    pub fn from_files(
-        files: &BTreeMap<&Path, FileInfo>,
+    pub fn from_files<'f>(
+        files: impl IntoIterator<Item = (&'f Path, &'f FileInfo)>,
         subsample: Option<Subsample>,
         picture: u64,
     ) -> Self {
-        let clouds = files.iter().filter(|(_, info)| info.n_triangles.is_none());
+        let (meshes, clouds): (Vec<_>, Vec<_>) =
+            files.into_iter().partition(|(_, info)| info.n_triangles.is_some());
+        let clouds = clouds.into_iter();
         let clouds: Vec<(u64, bool)> =
             clouds.map(|(file, info)| (n_points(file, info), are_splats(info))).collect();
         let n_points = sum(clouds.iter().map(|(n, _)| (*n, 1)));
         let n_splats =
             sum(clouds.iter().filter(|(_, are_splats)| *are_splats).map(|(n, _)| (*n, 1)));
-        let triangles = files.values().filter_map(|info| info.n_triangles);
+        let triangles = meshes.iter().filter_map(|(_, info)| info.n_triangles);
         let n_triangles = sum(triangles.map(|n| (n, 1)));
         Self { n_splats, n_triangles, picture, ..Self::of_points(n_points, subsample) }
     }

@@ -146,7 +146,8 @@ impl AutoSettings {
     ///
     /// # Errors
     ///
-    /// Fails for an environment map that cannot light the scene.
+    /// Fails for an unknown station, a plan in degrees or of too many pixels, a sun by date without a place, movements
+    /// that are not valid, and an environment map that cannot light the scene; and if cancelled.
     pub fn choose(
         scene: &LoadedScene,
         description: &SceneDescription,
@@ -361,6 +362,7 @@ fn description_camera(
         return CameraSettings {
             name,
             view_angle: description.camera.view_angle,
+            interior: description.camera.interior,
             ..CameraSettings::default()
         };
     }

@@ -7,6 +7,7 @@ use super::cloud::{
 use super::unlit::unlit_without_lights;
 use crate::description::{ObjectDescription, ObjectSettings};
 use crate::error::{Error, Result};
+use crate::memory_files::MemoryFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use surfel_core::math::{DAffine3, Vec3};
@@ -20,12 +21,17 @@ use surfel_formats::is_scene;
 pub fn is_streamed(
     object: &ObjectDescription,
     settings: &ObjectSettings,
+    memory: &MemoryFiles,
 ) -> surfel_formats::Result<bool> {
     if object.merge() || object.files.len() < 2 {
         return Ok(false);
     }
     for file in &object.files {
-        if !settings.preparation.vertices() && is_scene(file)? {
+        let holds_scene = match memory.get(file) {
+            Some(content) => content.is_scene(),
+            None => !settings.preparation.vertices() && is_scene(file)?,
+        };
+        if holds_scene {
             return Ok(false);
         }
     }
@@ -135,6 +141,11 @@ impl Sequence {
         Ok(true)
     }
 
+    /// Makes the next [`Sequence::seek`] read the file of its time, whichever is in the graph.
+    pub fn forget_file(&mut self) {
+        self.file_idx = usize::MAX;
+    }
+
     /// Returns the index of the file of a time; the last one stays.
     pub fn file_at(&self, time_secs: f64) -> usize {
         let has_begun = |file_idx: &usize| *file_idx as f64 / self.fps <= time_secs;
@@ -153,7 +164,7 @@ impl Sequence {
             }
         };
         let mut content = graph.try_map_clouds(|cloud: PointCloud| {
-            let cloud = self.without_dropped(cloud, progress)?;
+            let cloud = self.numbered(cloud, progress)?;
             let prepared = prepare_cloud(cloud, &self.settings, self.options.seed, progress);
             let colored = prepared
                 .and_then(|cloud| apply_surface_and_color(cloud, &self.settings, up, progress));
@@ -171,17 +182,13 @@ impl Sequence {
         Ok(content)
     }
 
-    /// Drops the points and columns that the settings do not keep, if all of the file was read.
-    fn without_dropped(
-        &self,
-        mut cloud: PointCloud,
-        progress: &dyn Progress,
-    ) -> Result<PointCloud> {
+    /// Numbers the points. Drops the points and columns that the settings do not keep, if all of the file was read.
+    fn numbered(&self, mut cloud: PointCloud, progress: &dyn Progress) -> Result<PointCloud> {
+        cloud.source_indices = Some((0..cloud.len() as u32).collect());
         if !self.options.keeps_all_columns {
             return Ok(cloud);
         }
         let settings = &self.settings.preparation;
-        cloud.source_indices = Some((0..cloud.len() as u32).collect());
         let mut cloud = filter_cloud(cloud, &DAffine3::IDENTITY, settings, progress)?;
         settings.drop_estimated(&mut cloud);
         Ok(cloud)

@@ -3,6 +3,7 @@
 use super::*;
 use crate::report::Verbosity;
 use surfel::memory_files::MemoryContent;
+use surfel_core::math::DVec3;
 use surfel_core::scene::Mesh;
 
 fn open(startup: SceneDescription) -> FileSceneProvider {
@@ -75,4 +76,37 @@ fn exported_commands_restore_defaults_that_a_scene_file_changes() {
     let command = provider.export(&settings).unwrap().command;
     let has = |option: &str| command.split(' ').any(|word| word == option);
     assert!(has("--spp=4") && has("--camera-lock=false"), "{command}");
+}
+
+#[test]
+fn points_of_a_later_file_of_a_sequence_have_no_columns_of_the_first() {
+    let cloud = |n: usize| {
+        let positions = corners().into_iter().take(n).collect();
+        let cloud =
+            PointCloud { intensity: Some(vec![7.0; n]), ..PointCloud::from_positions(positions) };
+        MemoryContent::Points(Arc::new(cloud), None)
+    };
+    let mut object = ObjectDescription::new("memory:0:a");
+    object.files.push("memory:1:b".into());
+    object.fps = Some(1.0);
+    let mut startup = SceneDescription::default();
+    startup.objects.push(object);
+    startup.memory.insert("memory:0:a", cloud(100));
+    startup.memory.insert("memory:1:b", cloud(400));
+    let provider = open(startup);
+    let mut settings = provider.startup_settings();
+    settings.insert("time".into(), json!(1));
+    let prepared = provider.prepare(&settings, &NoProgress).unwrap();
+    let position = DVec3::new(1.0, 2.0, 3.0);
+    let indices = (0..400).map(|primitive_idx| {
+        let (instance_idx, normal, depth) = (0, Vec3::Z, 1.0);
+        let picked = PickedPoint { instance_idx, primitive_idx, position, normal, depth };
+        let facts = (prepared.describe)(&prepared.flat, &picked);
+        assert_eq!(facts["columns"], json!([]));
+        assert_eq!(facts["position"], json!([1.0, 2.0, 3.0]));
+        facts["index"].as_u64().unwrap()
+    });
+    let mut indices: Vec<u64> = indices.collect();
+    indices.sort_unstable();
+    assert!(indices.into_iter().eq(0..400));
 }

@@ -104,10 +104,11 @@ impl LoadedScene {
         first..self.graph.nodes.len()
     }
 
-    /// Adds an object with its instances.
+    /// Adds an object with its instances. `twin` is the index of one before it that holds the same.
     pub(super) fn add_object(
         &mut self,
         object: &ObjectDescription,
+        twin: Option<usize>,
         description: &SceneDescription,
         motions: &[ObjectMotion],
         progress: &dyn Progress,
@@ -124,8 +125,7 @@ impl LoadedScene {
         };
         let node = self.add_animated(node, motions);
         let first = self.graph.nodes.len();
-        if let Some(twin) = before.iter().position(|other| other.has_same_content(object)) {
-            // The same files with the same settings are held once.
+        if let Some(twin) = twin {
             self.graph.add_instance(self.objects[twin].content.clone(), node);
         } else {
             self.add_content(node, object, description, progress)?;
@@ -154,7 +154,7 @@ impl LoadedScene {
     ) -> Result<()> {
         let owner = self.objects.len();
         let settings = object.settings.over(&description.objects_default);
-        if is_streamed(object, &settings)? {
+        if is_streamed(object, &settings, &description.memory)? {
             return self.add_sequence(node, object, settings, description, progress);
         }
         let mut merging = Vec::new();

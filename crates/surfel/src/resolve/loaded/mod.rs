@@ -14,7 +14,9 @@ use super::check_files::check_files;
 use super::cloud::{check_empty, filter_cloud, prepare_cloud};
 use super::environment::load_environment;
 use super::sequence::Sequence;
-use crate::description::{CameraMotion, Invalid, ObjectMotion, ObjectSettings, SceneDescription};
+use crate::description::{
+    CameraMotion, Invalid, ObjectMotion, ObjectSettings, SceneDescription, twins,
+};
 use crate::error::{Error, Result};
 use crate::file_names::list_files;
 use std::collections::BTreeMap;
@@ -129,8 +131,8 @@ impl LoadedScene {
         };
         let motions = object_motions(description)?;
         scene.add_files(description, progress)?;
-        for object in &description.objects {
-            scene.add_object(object, description, &motions, progress)?;
+        for (object, twin) in description.objects.iter().zip(twins(&description.objects)) {
+            scene.add_object(object, twin, description, &motions, progress)?;
         }
         for lamp in &description.lamps {
             let node = scene.add_animated(lamp.node()?, &motions);
@@ -166,8 +168,9 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut scene = self.clone();
-        for object in &description.objects[self.objects.len()..] {
-            scene.add_object(object, description, &[], progress)?;
+        let objects = description.objects.iter().zip(twins(&description.objects));
+        for (object, twin) in objects.skip(self.objects.len()) {
+            scene.add_object(object, twin, description, &[], progress)?;
         }
         scene.check_memory(description)?;
         scene.check_colors(description)?;
@@ -223,6 +226,11 @@ impl LoadedScene {
     /// Returns true if objects show files of a sequence one after the other.
     pub fn has_sequences(&self) -> bool {
         !self.sequences.is_empty()
+    }
+
+    /// Returns true if the content of a geometry of the graph is that of the first file of a sequence.
+    pub fn is_of_sequence(&self, geometry_idx: usize) -> bool {
+        self.sequences.iter().any(|sequence| sequence.slots.geometries.contains(&geometry_idx))
     }
 
     /// Returns the files without an object; those together that became one cloud.
