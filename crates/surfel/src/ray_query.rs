@@ -15,7 +15,7 @@ use surfel_core::trace::{InstanceFilter, SceneHit, Simd, scene_hits, scene_occlu
 pub const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
 
 /// Number of rays that a thread claims at a time.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 1024;
 
 /// Rays in world coordinates, kept relative to the origin of a flat scene.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +28,7 @@ pub struct WorldRays {
 impl WorldRays {
     /// Rays `[x, y, z, dx, dy, dz]`: origin and direction in world coordinates. The direction has any length; one of length
     /// 0 as f32, and a ray with a number that is not finite as f32, hits nothing. `t_range` is the part of each ray that counts, in
-    /// multiples of the length of its direction.
+    /// multiples of the length of its direction; nothing counts behind the origin.
     pub fn new(
         rays: impl IndexedParallelIterator<Item = [f64; 6]>,
         t_range: (f32, f32),
@@ -42,7 +42,7 @@ impl WorldRays {
             let Some(direction) = direction.try_normalize().filter(|_| is_valid) else {
                 return (Ray { t_max: -1.0, ..Ray::new(Vec3::ZERO, Vec3::Z) }, length);
             };
-            let (t_min, t_max) = (t_range.0 * length, t_range.1 * length);
+            let (t_min, t_max) = (t_range.0.max(0.0) * length, t_range.1 * length);
             (Ray { t_min, t_max, ..Ray::new(origin, direction.as_vec3()) }, length)
         };
         let (rays, lengths) = rays.map(local).unzip();
@@ -281,7 +281,8 @@ fn behind(ray: &Ray, hit: &SceneHit) -> Ray {
     /// A ray along the surface would otherwise be moved without bound.
     const MIN_COS: f32 = 0.1;
     let cos = ray.direction.dot(hit.geometric_normal).abs().max(MIN_COS);
-    let end = hit.distance.max(ray.t_min).next_up();
+    // Distances are rounded where instances scale them.
+    let end = (hit.distance.max(ray.t_min) * (1.0 + 4.0 * f32::EPSILON)).next_up();
     Ray { t_min: end.max(hit.distance + hit.radius / cos), ..*ray }
 }
 
@@ -295,13 +296,20 @@ mod tests {
     use crate::resolve;
     use std::path::Path;
     use std::sync::Arc;
+    use surfel_core::math::DAffine3;
     use surfel_core::math::Vec2;
     use surfel_core::points::PointCloud;
     use surfel_core::scene::Background;
-    use surfel_core::scene::{Camera, Geometry, Graph, Material, Mesh, Projection, Scene};
+    use surfel_core::scene::{
+        Camera, Geometry, Graph, Material, Mesh, Projection, Scene, Transform,
+    };
 
     /// Two squares of side 2 about the z axis, at z = 0 and z = 3, far from the world's origin.
     fn two_squares() -> FlatScene {
+        squares(Transform::IDENTITY)
+    }
+
+    fn squares(transform: Transform) -> FlatScene {
         let corners =
             [Vec2::new(-1.0, -1.0), Vec2::new(1.0, -1.0), Vec2::ONE, Vec2::new(-1.0, 1.0)];
         let square = |z: f32| corners.map(|corner| corner.extend(z));
@@ -311,7 +319,8 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
             ..Mesh::default()
         };
-        let graph = Graph::from_geometry(Geometry::Triangles(mesh), Material::MATTE);
+        let mut graph = Graph::from_geometry(Geometry::Triangles(mesh), Material::MATTE);
+        graph.nodes[0].transform = transform;
         let camera = Camera {
             position: DVec3::ZERO,
             focal_point: DVec3::Y,
@@ -349,6 +358,21 @@ mod tests {
         assert_eq!(caster.hits(&odd, &NoProgress).unwrap().t_hit, [none, none]);
         let late = WorldRays::new(rays.par_iter().copied(), (8.0, 20.0), &scene);
         assert_eq!(caster.hits(&late, &NoProgress).unwrap().t_hit[0], 10.0);
+    }
+
+    #[test]
+    fn each_surface_of_a_scaled_mesh_counts_once() {
+        for scale in [0.01, 0.3048, 10.0, 1000.0] {
+            let scene = squares(Transform::Matrix(DAffine3::from_scale(DVec3::splat(scale))));
+            let caster = RayCaster::new(&scene, Simd::detect(), Vec::new()).unwrap();
+            let rays = (0..1000).map(|i| {
+                let (x, z) = (scale * (5e5 + 0.3), scale * (4.0 + 7.0 * f64::from(i) / 1000.0));
+                [x, scale * 4e6, z, 0.0, 0.0, -1.0]
+            });
+            let rays: Vec<[f64; 6]> = rays.collect();
+            let rays = WorldRays::new(rays.par_iter().copied(), WHOLE_RAY, &scene);
+            assert_eq!(caster.counts(&rays, &NoProgress).unwrap(), [2; 1000], "{scale}");
+        }
     }
 
     /// Returns a plane of points on z = 0, the first of which is not finite.

@@ -103,7 +103,7 @@ impl FlatGaussians {
     ///
     /// # Errors
     ///
-    /// Fails if the cloud lacks the columns of trained Gaussians, if there are too many, or if `progress` is cancelled.
+    /// Fails if the cloud lacks the columns of trained Gaussians, or if `progress` is cancelled.
     pub(super) fn new(
         geometry: &CloudGeometry,
         positions: &[Vec3],

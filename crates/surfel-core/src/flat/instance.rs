@@ -47,22 +47,22 @@ pub(super) struct Placement {
 }
 
 impl Instance {
-    /// Returns an instance of the first geometry with the first material. Returns none if the transform is not
-    /// finite or not invertible.
+    /// Returns an instance of the first geometry with the first material. Returns none if the transform or
+    /// its inverse is not finite as f32.
     pub(super) fn new(placement: Placement) -> Option<Self> {
         let Placement { world_from_object, object_origin, object_bounds, scene_origin } = placement;
         let matrix3 = world_from_object.matrix3;
         let translation = world_from_object.transform_point3(object_origin) - scene_origin;
         let transform = DAffine3 { matrix3, translation };
         let inverse = transform.inverse();
-        if !(transform.is_finite() && inverse.is_finite()) {
+        let is_identity = transform == DAffine3::IDENTITY;
+        let (world_from_object, object_from_world) = (to_f32(transform), to_f32(inverse));
+        if !(world_from_object.is_finite() && object_from_world.is_finite()) {
             return None;
         }
-        let is_identity = transform == DAffine3::IDENTITY;
-        let world_from_object = to_f32(transform);
         let lengths = [matrix3.x_axis, matrix3.y_axis, matrix3.z_axis].map(DVec3::length);
         Some(Self {
-            object_from_world: to_f32(inverse),
+            object_from_world,
             world_from_object,
             world_from_normal: inverse.matrix3.transpose().as_mat3(),
             max_scale: lengths.into_iter().fold(0.0, f64::max) as f32,

@@ -46,7 +46,7 @@ impl FlatPoints {
     ///
     /// # Errors
     ///
-    /// Fails if there are too many points for 32-bit indices, or if `progress` is cancelled.
+    /// Fails if `progress` is cancelled.
     pub fn new(columns: PointColumns, progress: &dyn Progress) -> Result<Self> {
         let kind = columns.kind();
         let ids = 0..columns.len() as u32;

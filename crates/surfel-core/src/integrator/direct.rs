@@ -166,24 +166,13 @@ impl DirectLight<'_> {
                 let contribution = point.reflected_radiance(direction, light.color)?;
                 return Some(ShadowRay { direction, t_max: f32::INFINITY, contribution });
             }
-            let mut target = light.position;
-            if 0.0 < light.radius {
-                // The visible half of the sphere appears as a disc that faces the shading point.
-                let dimension = hash(PUNCTUAL_LIGHT_POSITION ^ light_idx << 8);
-                let uv = owen_sobol_2d(index, hash(point.key ^ dimension));
-                let basis = Basis::around((position - target).normalize_or(Vec3::Z));
-                let (x, y) = disk(uv);
-                target += light.radius * (x * basis.tangent + y * basis.bitangent);
-            }
-            let offset = target - position;
-            let distance = offset.length();
-            let direction = offset.try_normalize()?;
-            let falloff = light.falloff(-direction, distance);
+            let dimension = hash(PUNCTUAL_LIGHT_POSITION ^ light_idx << 8);
+            let uv = || owen_sobol_2d(index, hash(point.key ^ dimension));
+            let LampRay { direction, t_max, falloff } = lamp_ray(light, position, uv)?;
             if falloff <= 0.0 {
                 return None;
             }
             let contribution = point.reflected_radiance(direction, falloff * light.color)?;
-            let t_max = distance - light.radius.min(0.5 * distance);
             Some(ShadowRay { direction, t_max, contribution })
         };
         self.add_light(max_samples, sample, points, radiance)
@@ -239,6 +228,49 @@ impl DirectLight<'_> {
         }
         Ok(n_rays)
     }
+}
+
+/// A ray from a position to a lamp.
+struct LampRay {
+    /// Unit direction.
+    direction: Vec3,
+    /// Distance of the lamp's surface.
+    t_max: f32,
+    /// Factor on the lamp's intensity.
+    falloff: f32,
+}
+
+/// Returns a ray to a lamp, whose ball a sample chooses. The mean of the rays gives a surface that faces the ball the
+/// irradiance of a lamp in its centre. There is none from the centre.
+fn lamp_ray(
+    light: &FlatPunctualLight,
+    position: Vec3,
+    uv: impl Fn() -> (f32, f32),
+) -> Option<LampRay> {
+    let offset = light.position - position;
+    let (distance, toward) = (offset.length(), offset.try_normalize()?);
+    if light.radius <= 0.0 {
+        let falloff = light.falloff(-toward, distance);
+        return Some(LampRay { direction: toward, t_max: distance, falloff });
+    }
+    if distance <= light.radius {
+        // Within the ball, light comes from the disc through its centre.
+        let basis = Basis::around(toward);
+        let (x, y) = disk(uv());
+        let offset = offset + light.radius * (x * basis.tangent + y * basis.bitangent);
+        let (distance, direction) = (offset.length(), offset.try_normalize()?);
+        let falloff = light.falloff(-direction, distance);
+        return Some(LampRay { direction, t_max: 0.5 * distance, falloff });
+    }
+    let sine = light.radius / distance;
+    let cos_max = (1.0 - sine * sine).sqrt();
+    let local = uniform_cone(uv(), cos_max);
+    let direction = Basis::around(toward).to_world(local);
+    // Over the cone, the cosine at the surface has the mean (1 + cos_max) / 2.
+    let falloff = 2.0 / (1.0 + cos_max) * light.falloff(-direction, distance);
+    let aside = distance * local.truncate().length();
+    let depth = (light.radius * light.radius - aside * aside).max(0.0).sqrt();
+    Some(LampRay { direction, t_max: distance * local.z - depth, falloff })
 }
 
 impl ShadingPoint {

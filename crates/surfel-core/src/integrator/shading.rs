@@ -44,7 +44,11 @@ pub struct Shading {
     coordinate_magnitude: f32,
 }
 
-/// Returns the base colour at a hit, linear. `hit` must not be a miss.
+/// Returns the base colour at a hit, linear.
+///
+/// # Panics
+///
+/// Panics for a miss.
 pub fn albedo(scene: &FlatScene, ray: &Ray, hit: &SceneHit) -> Vec3 {
     Shading::new(scene, ray, hit).base_color
 }

@@ -146,7 +146,9 @@ fn integrate_albedo(cos: f32, roughness: f32) -> f32 {
 /// normal, and the roughness.
 pub fn ggx_specular(cos_view: f32, cos_light: f32, cos_half: f32, roughness: f32) -> f32 {
     let alpha = ggx_alpha(roughness);
-    let squared = cos_half * cos_half * (alpha * alpha - 1.0) + 1.0;
+    // `1 + cos² (α² - 1)`, without a difference of almost equal numbers.
+    let cos_squared = (cos_half * cos_half).min(1.0);
+    let squared = (1.0 - cos_squared) + cos_squared * alpha * alpha;
     let density = alpha * alpha / (PI * squared * squared);
     let masking = smith_g2_over_g1(cos_view, cos_light, roughness) * smith_g1(cos_view, alpha);
     density * masking / (4.0 * cos_view * cos_light) / directional_albedo(cos_view, roughness)
@@ -158,6 +160,19 @@ mod tests {
 
     use super::*;
     use crate::math::{Random, cosine_hemisphere};
+
+    #[test]
+    fn highlights_of_smooth_surfaces_are_finite() {
+        for roughness in [0.02, 0.022, 0.03, 0.05] {
+            let alpha = ggx_alpha(roughness);
+            // Seen and lit head on nothing is masked.
+            let expected = 1.0 / (4.0 * PI * alpha * alpha) / directional_albedo(1.0, roughness);
+            for cos_half in [1.0, 1.0 + f32::EPSILON] {
+                let found = ggx_specular(1.0, 1.0, cos_half, roughness);
+                assert!((found / expected - 1.0).abs() < 1e-3, "{roughness}: {found}, {expected}");
+            }
+        }
+    }
 
     #[test]
     fn glass_reflects_4_percent_head_on_and_all_beyond_the_critical_angle() {

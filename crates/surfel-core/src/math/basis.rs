@@ -33,7 +33,8 @@ impl Basis {
     }
 }
 
-/// Returns the tangents and bitangents around unit normals in lanes, computed like those of `Basis::around`.
+/// Returns the tangents and bitangents around unit normals in lanes, computed like those of `Basis::around`; a zero has no
+/// sign here.
 #[inline(always)]
 pub fn tangents<F: Floats>(normal: Vec3Lanes<F>) -> [Vec3Lanes<F>; 2] {
     let (zero, one) = (F::splat(0.0), F::splat(1.0));

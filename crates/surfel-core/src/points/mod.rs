@@ -51,6 +51,7 @@ pub use cloud::gaussians::{
 };
 pub use cloud::known_column::{KnownColumn, is_label, name_of_pdal, plain_name};
 pub use cloud::merge::merge;
+pub(crate) use cloud::point_cloud::check_count;
 pub use cloud::point_cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use cloud::scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};
 pub use denoising::denoise::{Denoise, DenoiseReport, Denoised, denoise};

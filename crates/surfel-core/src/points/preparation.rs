@@ -96,8 +96,10 @@ impl Preparation {
     /// Returns [`Error::Setting`] for a value out of range, as [`prepare`](super::prepare) does.
     pub fn check(&self) -> Result<()> {
         self.radius.check()?;
-        if let Neighborhood::Nearest(k @ 0..2) = self.normals {
-            let expected = "at least 2, to span a plane";
+        if let Neighborhood::Nearest(k) = self.normals
+            && !(2..1 << 20).contains(&k)
+        {
+            let expected = "from 2, to span a plane, to a million";
             let name = "number of neighbours for normals";
             return Err(Error::Setting { name, found: k.to_string(), expected });
         }

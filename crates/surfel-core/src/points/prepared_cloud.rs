@@ -1,7 +1,7 @@
 //! Prepared clouds, whose type guarantees that they can be traced.
 
 use super::normals::orient::has_stations;
-use super::{PointCloud, is_valid_position};
+use super::{PointCloud, check_count, is_valid_position};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -21,9 +21,10 @@ impl PreparedCloud {
     /// # Errors
     ///
     /// Returns [`Error::MissingColumn`] for a cloud without radii, [`Error::ColumnLength`] for a column that does not
-    /// have one entry for each point, and [`Error::InvalidPosition`] for a position that is NaN, infinite or too far
-    /// from the origin (see [`is_valid_position`]).
+    /// have one entry for each point, [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::InvalidPosition`] for a
+    /// position that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
     pub fn new(cloud: PointCloud) -> Result<Self> {
+        check_count(cloud.len())?;
         if cloud.radii.is_none() {
             return Err(Error::MissingColumn { column: "radii" });
         }

@@ -107,7 +107,11 @@ pub trait KeyframeValue: Clone {
 }
 
 impl<T: KeyframeValue> Keyframes<T> {
-    /// Returns the value at a time. There must be at least one key.
+    /// Returns the value at a time.
+    ///
+    /// # Panics
+    ///
+    /// Panics without a key.
     pub fn at(&self, time_secs: f64) -> T {
         let next = self.times_secs.partition_point(|&time| time <= time_secs);
         let Some(last) = next.checked_sub(1) else { return self.value(0).clone() };
@@ -156,14 +160,14 @@ impl<T: KeyframeValue + Copy + Default + Sub<Output = T> + Div<f64, Output = T>>
 
 /// Returns a smooth path through two or more positions that takes `secs` seconds.
 ///
-/// The mean speed between neighbouring positions is the same everywhere.
+/// The mean speed between neighbouring positions is the same everywhere. Of a single position the path stays there.
 pub fn catmull_rom_path(positions: &[DVec3], secs: f64) -> Keyframes<DVec3> {
     let mut lengths = vec![0.0];
     for pair in positions.windows(2) {
         // Times must ascend, so equal positions take a little time, too.
         lengths.push(lengths[lengths.len() - 1] + pair[0].distance(pair[1]).max(1e-9));
     }
-    let total = lengths[lengths.len() - 1];
+    let total = lengths[lengths.len() - 1].max(f64::MIN_POSITIVE);
     let times_secs = lengths.iter().map(|length| secs * length / total).collect();
     Keyframes { times_secs, values: positions.to_vec(), interpolation: Interpolation::Linear }
         .with_catmull_rom_tangents()

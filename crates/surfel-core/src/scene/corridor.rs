@@ -1,6 +1,7 @@
 //! Views along corridors: roads, railways, power lines and rivers are long strips, which fill little of a picture across.
 
 use super::camera_fit::{CameraFit, fit_along};
+use super::depth_map::small_aspect;
 use super::ground::ground_axes;
 use super::inliers::range_along;
 use crate::math::{DVec3, Vec3};
@@ -68,7 +69,7 @@ pub(super) fn long_axis(points: &[Vec3], up: Vec3) -> Option<Vec3> {
 /// all of them.
 fn filled_fraction(points: &[Vec3], forward: DVec3, fit: &CameraFit) -> f64 {
     const HEIGHT: u32 = 27;
-    let width = (f64::from(HEIGHT) * fit.aspect).round().max(1.0) as u32;
+    let width = (f64::from(HEIGHT) * small_aspect(fit.aspect)).round().max(1.0) as u32;
     let view = fit_along(forward, points, fit).view(DVec3::ZERO, width, HEIGHT);
     let mut is_filled = vec![false; (width * HEIGHT) as usize];
     for (x, y, _) in points.iter().filter_map(|point| view.project(*point)) {

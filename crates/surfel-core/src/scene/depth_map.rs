@@ -8,6 +8,11 @@ const POINTS_PER_PIXEL: f64 = 10.0;
 /// Maximum height in pixels.
 const MAX_HEIGHT: f64 = 128.0;
 
+/// Returns the width over height of a small picture that stands for one of this aspect: at most 64, or its inverse.
+pub(super) fn small_aspect(aspect: f64) -> f64 {
+    aspect.clamp(1.0 / 64.0, 64.0)
+}
+
 /// The nearest point of each pixel of a small picture.
 pub(super) struct DepthMap {
     /// The camera, in the coordinates of the points.
@@ -20,6 +25,7 @@ pub(super) struct DepthMap {
 impl DepthMap {
     /// Returns the map of `points` seen by `camera`, which is in their coordinates. `aspect` is width over height.
     pub fn new(points: &[Vec3], camera: &Camera, aspect: f64) -> Self {
+        let aspect = small_aspect(aspect);
         let height = (points.len() as f64 / POINTS_PER_PIXEL / aspect).sqrt();
         let height = height.clamp(4.0, MAX_HEIGHT) as u32;
         let width = (f64::from(height) * aspect) as u32;

@@ -342,7 +342,10 @@ impl<C: AsRef<PointCloud>> Graph<C> {
                     points.extend(positions.iter().step_by(step).map(point));
                     // A cloud of several files has several parts.
                     let part_of = cloud.as_ref().scalar(PART);
-                    let part = |i: usize| 1 + n_parts + part_of.map_or(0, |it| it.get(i) as i32);
+                    let part = |i: usize| {
+                        let of_cloud = part_of.map_or(0, |parts| parts.get(i) as i32);
+                        n_parts.saturating_add(1).saturating_add(of_cloud)
+                    };
                     let first = parts.len();
                     parts.extend((0..positions.len()).step_by(step).map(part));
                     n_parts = parts[first..].iter().copied().fold(n_parts, i32::max);

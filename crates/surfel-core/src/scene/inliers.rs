@@ -10,7 +10,7 @@ const OUTLIER_FRACTION: f64 = 0.005;
 const MAX_SAMPLES: usize = 200_000;
 
 /// Name of the scalar column that tells which part of a sampled scene each point is of. A part is no outlier of the others,
-/// however few its points are. No file has a column of this name.
+/// however few its points are. Columns of files that have this name are not read.
 pub const PART: &str = "surfel:part";
 
 /// Returns the bounds of all points but the outliers, relative to the cloud's origin.
@@ -95,6 +95,10 @@ fn without_stray_groups(points: Vec<Vec3>) -> Vec<Vec3> {
     const MIN_RATIO: f32 = 1.3;
     /// Number of rounds: the cells of the next round are those of the smaller cloud.
     const N_ROUNDS: usize = 3;
+    if MAX_GROUP_FRACTION * (points.len() as f64) < 1.0 {
+        // No group is small.
+        return points;
+    }
     let mut points = points;
     for _ in 0..N_ROUNDS {
         let longest =

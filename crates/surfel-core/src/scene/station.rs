@@ -5,8 +5,7 @@ use super::direction_cells::{
 };
 use super::ground::direction;
 use super::inside_view::InsideView;
-use super::sample;
-use crate::math::{Aabb, DVec3, Vec3, quantile};
+use crate::math::{self, Aabb, DVec3, Vec3, quantile};
 use crate::points::{PointCloud, is_camera_frame, is_in_camera_view, is_valid_position};
 use std::f32::consts::TAU;
 
@@ -124,7 +123,7 @@ fn valid_sample(cloud: &PointCloud) -> Vec<Vec3> {
 /// Returns the indices of valid points at about equal steps.
 fn sample_indices(cloud: &PointCloud) -> impl Iterator<Item = usize> {
     let is_valid = |i: &usize| is_valid_position(cloud.positions[*i]);
-    sample::sample_indices(cloud.len(), MAX_SAMPLES).filter(is_valid)
+    math::sample_indices(cloud.len(), MAX_SAMPLES).filter(is_valid)
 }
 
 /// Returns the 10th, 50th and 90th percentile of the distances.

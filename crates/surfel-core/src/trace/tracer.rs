@@ -14,11 +14,10 @@ use crate::trace::scene::scene_support::scene_supports;
 use crate::trace::simd::Simd;
 use crate::trace::traversal::octree_walk::PixelSize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// Traces the rays of a job in chunks, between which it checks for cancellation: a ray among points that lie
-/// thousands over each other takes milliseconds. All threads of the job share one tracer.
+/// thousands over each other takes milliseconds.
 pub struct Tracer<'a> {
     /// The scene.
     pub scene: &'a FlatScene,
@@ -28,17 +27,13 @@ pub struct Tracer<'a> {
     pub progress: &'a dyn Progress,
     /// The size of a pixel along rays from the camera.
     pub pixel: PixelSize,
-    /// Number of rays traced so far by all threads.
-    n_traced: AtomicUsize,
-    /// Number of rays that take `MAX_CHUNK_TIME`, estimated from the last chunk of any thread.
-    n_affordable: AtomicUsize,
 }
 
-/// Maximum number of rays in a chunk: more are not faster.
-const MAX_CHUNK_SIZE: usize = 1 << 14;
-/// A chunk holds at most the rays traced before, divided by this: the first rays may see nothing but the sky.
-const RAMP_UP_DIVISOR: usize = 16;
-/// Maximum time between two checks for cancellation.
+/// Number of rays in the first chunk of a batch.
+const FIRST_CHUNK_SIZE: usize = 1 << 8;
+/// Maximum number of rays in a chunk: those behind fast ones may be slow.
+const MAX_CHUNK_SIZE: usize = 1 << 10;
+/// Time of a chunk from which on the next one is smaller.
 const MAX_CHUNK_TIME: Duration = Duration::from_millis(5);
 
 impl<'a> Tracer<'a> {
@@ -49,8 +44,7 @@ impl<'a> Tracer<'a> {
         pixel: PixelSize,
         progress: &'a dyn Progress,
     ) -> Self {
-        let (n_traced, n_affordable) = (AtomicUsize::new(0), AtomicUsize::new(MAX_CHUNK_SIZE));
-        Self { scene, simd, progress, pixel, n_traced, n_affordable }
+        Self { scene, simd, progress, pixel }
     }
 
     /// Runs [`scene_hits`](super::scene_hits) at the size of a pixel.
@@ -123,34 +117,23 @@ impl<'a> Tracer<'a> {
 
     /// Calls `trace` for consecutive ranges of rays.
     fn in_chunks(&self, n_rays: usize, mut trace: impl FnMut(Range<usize>)) -> Result<()> {
-        let mut first = 0;
+        let (mut first, mut size) = (0, FIRST_CHUNK_SIZE);
         while first < n_rays {
             self.progress.check()?;
-            let end = n_rays.min(first + self.chunk_size());
+            let end = n_rays.min(first + size);
             let start = Instant::now();
             trace(first..end);
-            self.update_rate(end - first, start.elapsed());
+            size = next_size(end - first, start.elapsed());
             first = end;
         }
         Ok(())
     }
+}
 
-    /// Returns the size of the next chunk, in whole packets.
-    fn chunk_size(&self) -> usize {
-        let ramp_up_limit =
-            PACKET_WIDTH.max(self.n_traced.load(Ordering::Relaxed) / RAMP_UP_DIVISOR);
-        let n_affordable = self.n_affordable.load(Ordering::Relaxed);
-        ramp_up_limit.min(n_affordable).next_multiple_of(PACKET_WIDTH)
-    }
-
-    /// Updates the number of rays that a chunk can afford.
-    fn update_rate(&self, n_rays: usize, time: Duration) {
-        let n_affordable =
-            n_rays as f64 * MAX_CHUNK_TIME.as_secs_f64() / time.as_secs_f64().max(1e-9);
-        self.n_affordable
-            .store((n_affordable as usize).clamp(1, MAX_CHUNK_SIZE), Ordering::Relaxed);
-        self.n_traced.fetch_add(n_rays, Ordering::Relaxed);
-    }
+/// Returns the size of the chunk behind one of `n_rays` that took a time, in whole packets.
+fn next_size(n_rays: usize, time: Duration) -> usize {
+    let n_affordable = n_rays as f64 * MAX_CHUNK_TIME.as_secs_f64() / time.as_secs_f64().max(1e-9);
+    (n_affordable as usize).min(2 * n_rays).clamp(1, MAX_CHUNK_SIZE).next_multiple_of(PACKET_WIDTH)
 }
 
 #[cfg(test)]
@@ -191,14 +174,10 @@ mod tests {
     fn chunks_grow_while_rays_are_fast_and_shrink_while_they_are_slow() {
         let scene = empty();
         let tracer = Tracer::new(&scene, Simd::detect(), PixelSize::ZERO, &NoProgress);
-        let fast = chunk_sizes(&tracer, 400_000, Duration::ZERO);
-        assert_eq!((fast[0], fast.iter().sum()), (PACKET_WIDTH, 400_000));
-        assert!(fast.iter().all(|n| *n <= MAX_CHUNK_SIZE) && 4096 <= *fast.iter().max().unwrap());
-        chunk_sizes(&tracer, 100, Duration::from_millis(2));
-        assert_eq!(
-            chunk_sizes(&tracer, 56, Duration::from_millis(2)),
-            [PACKET_WIDTH, PACKET_WIDTH, PACKET_WIDTH, 8]
-        );
+        let fast = chunk_sizes(&tracer, 4000, Duration::ZERO);
+        assert_eq!(fast, [256, 512, 1024, 1024, 1024, 160]);
+        let slow = chunk_sizes(&tracer, 300, Duration::from_millis(2));
+        assert_eq!(slow, [256, PACKET_WIDTH, PACKET_WIDTH, 12]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Airborne laser scanners: pulses across flight lines, each with several returns.
 
-use super::instrument::{Instrument, check_positive};
+use super::instrument::{Instrument, check_positive, check_size};
 use super::returns::{Return, into_cloud};
 use crate::sdf::{DRay, SdfHit, SdfScene};
 use rayon::prelude::*;
@@ -145,6 +145,9 @@ impl Instrument for AirborneLidar {
         check_positive("pulse_step_rad", self.pulse_step_rad)?;
         check_positive("max_range", self.max_range)?;
         let n_rows = |line: &FlightLine| (line.length() / self.line_step) as usize;
+        let n_pulses = 2.0 * self.max_scan_angle_rad / self.pulse_step_rad;
+        let length: f64 = self.lines.iter().map(FlightLine::length).sum();
+        check_size(self.lines.len(), n_pulses * (length / self.line_step).max(1.0))?;
         let rows: Vec<(usize, usize)> = (0..self.lines.len())
             .flat_map(|line_idx| (0..n_rows(&self.lines[line_idx])).map(move |row| (line_idx, row)))
             .collect();

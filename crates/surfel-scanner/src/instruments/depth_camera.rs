@@ -1,6 +1,6 @@
 //! Depth cameras: grids of depths whose noise grows with the square of the depth.
 
-use super::instrument::{Instrument, check_positive};
+use super::instrument::{Instrument, check_positive, check_size};
 use super::returns::{Return, add_grid, into_cloud};
 use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
@@ -93,6 +93,10 @@ impl Instrument for DepthCamera {
     fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
         check_positive("view_angle_rad", self.view_angle_rad)?;
         check_positive("max_depth", self.max_depth)?;
+        check_size(
+            self.poses.len(),
+            [self.poses.len(), self.height, self.width].map(|n| n as f64).iter().product(),
+        )?;
         let n_rows = self.poses.len() * self.height;
         progress.begin("scan", n_rows as u64);
         let scan_row = |row: usize| {

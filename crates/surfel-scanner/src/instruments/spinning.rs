@@ -1,6 +1,6 @@
 //! Spinning laser scanners on a vehicle: rings of rays about the vertical axis, driven along a path.
 
-use super::instrument::{Instrument, check_positive};
+use super::instrument::{Instrument, check_positive, check_size};
 use super::returns::{Return, into_cloud};
 use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
@@ -83,14 +83,14 @@ impl SpinningLidar {
         DRay { origin, direction: DVec3::new(run * cos, run * sin, rise) }
     }
 
-    fn scan_column(&self, scene: &SdfScene, column: usize) -> Vec<(u8, f64, Return)> {
+    fn scan_column(&self, scene: &SdfScene, column: usize) -> Vec<(u16, f64, Return)> {
         let time = column as f64 / f64::from(self.n_azimuths) / self.rotation_hz;
         let scan_ring = |ring: u32| {
             let ray = self.ray(column, ring);
             let hit = scene.first_hit(&ray, self.max_range)?;
             let mut random = Random::new(self.seed, ((column as u64) << 32) | u64::from(ring));
             let range = hit.distance + self.range_noise * random.next_gaussian();
-            Some((ring as u8, time, Return::new(scene, &ray, hit, range, 1)))
+            Some((ring as u16, time, Return::new(scene, &ray, hit, range, 1)))
         };
         (0..self.n_rings).filter_map(scan_ring).collect()
     }
@@ -103,6 +103,9 @@ impl Instrument for SpinningLidar {
         check_positive("speed", self.speed)?;
         check_positive("rotation_hz", self.rotation_hz)?;
         check_positive("max_range", self.max_range)?;
+        let n_revolutions = self.path_length() / self.speed * self.rotation_hz;
+        let n_rays = n_revolutions.max(1.0) * f64::from(self.n_azimuths) * f64::from(self.n_rings);
+        check_size(1, n_rays)?;
         let n_columns = self.n_revolutions() * self.n_azimuths as usize;
         progress.begin("scan", n_columns as u64);
         let scan_column = |column| {
@@ -119,7 +122,7 @@ impl Instrument for SpinningLidar {
             returns.push(found);
         }
         let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
-        cloud.scalars.push(Scalar { name: "ring".to_owned(), values: Values::U8(rings) });
+        cloud.scalars.push(Scalar { name: "ring".to_owned(), values: Values::U16(rings) });
         cloud.scalars.push(Scalar { name: "gps_time".to_owned(), values: Values::F64(times) });
         if let [position] = self.path[..] {
             let position = Some(position);
@@ -163,7 +166,7 @@ mod tests {
         let ground = Plane { normal: DVec3::Z, offset: 0.0, color: Vec3::ONE };
         let lidar = lidar();
         let cloud = lidar.scan(&SdfScene::default().with(ground), &NoProgress).unwrap();
-        let Some(Values::U8(rings)) = cloud.scalar("ring") else { unreachable!() };
+        let Some(Values::U16(rings)) = cloud.scalar("ring") else { unreachable!() };
         let Some(Values::F64(times)) = cloud.scalar("gps_time") else { unreachable!() };
         assert!(1000 < cloud.len());
         for ((position, ring), time) in cloud.positions.iter().zip(rings).zip(times) {
@@ -174,6 +177,23 @@ mod tests {
             let found = (position.as_dvec3() - origin).truncate().length();
             assert!((found / expected - 1.0).abs() < 1e-2, "ring {ring}: {found}, {expected}");
         }
+    }
+
+    #[test]
+    fn many_rings_have_numbers_of_their_own() {
+        let ground = Plane { normal: DVec3::Z, offset: 0.0, color: Vec3::ONE };
+        let elevation_rad = (-0.5, -0.1);
+        let lidar = SpinningLidar { n_rings: 300, n_azimuths: 8, elevation_rad, ..lidar() };
+        let cloud = lidar.scan(&SdfScene::default().with(ground), &NoProgress).unwrap();
+        let Some(Values::U16(rings)) = cloud.scalar("ring") else { unreachable!() };
+        assert_eq!(rings.iter().max(), Some(&299));
+    }
+
+    #[test]
+    fn scans_of_very_many_rays_are_refused() {
+        let lidar = SpinningLidar { n_azimuths: u32::MAX, ..lidar() };
+        let error = lidar.scan(&SdfScene::default(), &NoProgress).unwrap_err().to_string();
+        assert!(error.contains("number of rays"), "{error}");
     }
 
     #[test]

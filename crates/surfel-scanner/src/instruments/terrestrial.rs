@@ -1,6 +1,6 @@
 //! Terrestrial laser scanners: rays from stations, each of which gives at most one point.
 
-use super::instrument::Instrument;
+use super::instrument::{Instrument, check_size};
 use super::returns::{Return, add_grid, into_cloud};
 use super::station::Station;
 use crate::sdf::{DRay, SdfScene};
@@ -60,6 +60,10 @@ impl Scanner {
         progress: &dyn Progress,
     ) -> Result<PointCloud> {
         self.validate()?;
+        let n_rays = |station: &Station| {
+            station.n_columns(self.step_rad) as f64 * station.n_rows(self.step_rad) as f64
+        };
+        check_size(stations.len(), stations.iter().map(n_rays).sum())?;
         let n_columns: usize =
             stations.iter().map(|station| station.n_columns(self.step_rad)).sum();
         progress.begin("scan", n_columns as u64);

@@ -102,7 +102,7 @@ pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
 ///
 /// # Errors
 ///
-/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+/// Returns [`Error::Cancelled`](surfel_core::Error::Cancelled) if `progress` is cancelled.
 pub fn scan(n_points: usize, progress: &dyn Progress) -> Result<PointCloud> {
     // Number of points of a scan times the square of its angular step, measured at a million points.
     const POINTS_TIMES_STEP_SQUARED: f64 = 14.74;

@@ -3,9 +3,11 @@
 use crate::bad_clouds;
 use crate::implicit::sheets;
 use crate::rays::{hits, rays_from_above};
+use std::sync::Mutex;
 use surfel_core::flat::{FlatCloud, Octree, OctreeOptions};
 use surfel_core::math::{Ray, Vec3};
-use surfel_core::progress::NoProgress;
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::scene::CloudGeometry;
 use surfel_core::surface::{OctreeDepth, SurfaceKind};
 use surfel_core::trace::{Simd, SurfaceHit, occlusions};
 use surfel_tests::clouds;
@@ -127,6 +129,33 @@ fn a_given_depth_gives_cells_of_that_size() {
             assert!(error < 0.7 * last_error, "{kind:?} at depth {depth}: {error}");
             last_error = error;
         }
+    }
+}
+
+/// Keeps warnings.
+#[derive(Default)]
+struct Warnings(Mutex<Vec<String>>);
+
+impl Progress for Warnings {
+    fn warning(&self, line: &str, _keys: &[&str]) {
+        self.0.lock().unwrap().push(line.to_owned());
+    }
+}
+
+#[test]
+fn levels_that_have_no_room_are_told() {
+    for kind in KINDS {
+        let mut points = scenes::points(clouds::sphere(2000, 1.0), kind);
+        let warnings_at = |points: &CloudGeometry| {
+            let warnings = Warnings::default();
+            FlatCloud::new(points, &warnings).unwrap();
+            warnings.0.into_inner().unwrap()
+        };
+        points.octree_depth = OctreeDepth::Levels(4);
+        assert_eq!(warnings_at(&points), [] as [String; 0]);
+        points.octree_depth = OctreeDepth::Levels(14);
+        let told = warnings_at(&points);
+        assert!(told.len() == 1 && told[0].contains("more take too much memory"), "{told:?}");
     }
 }
 

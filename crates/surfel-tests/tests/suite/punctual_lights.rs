@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 use surfel_core::flat::FlatScene;
 use surfel_core::math::{DAffine3, DQuat, DVec3, Vec3};
 use surfel_core::progress::NoProgress;
-use surfel_core::render::{CpuRenderer, Renderer};
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
 use surfel_core::scene::{
     Background, Geometry, Graph, Light, Material, Node, PunctualLight, PunctualLightKind, Scene,
     Sun, Transform,
@@ -164,6 +164,22 @@ fn a_ball_shadows_the_cone_behind_it() {
         n_lit += u32::from(!is_dark);
     }
     assert!(20 < n_dark && 500 < n_lit, "{n_dark} {n_lit}");
+}
+
+/// The mean of many samples is that of a lamp in the centre where the floor faces the ball, however near it is.
+#[test]
+fn balls_light_the_floor_below_them_as_points_do() {
+    for (radius, height) in [(0.2f32, 1.0f32), (0.5, 1.0), (0.9, 1.0), (1.5, 2.0)] {
+        let above = DAffine3::from_translation(f64::from(height) * DVec3::Z);
+        let light = PunctualLight { radius, ..punctual(PunctualLightKind::Point) };
+        let mut scene = over_floor(light, above);
+        scene.camera = from_above(0.01);
+        let settings = Settings { light_samples: 1024, ..SETTINGS };
+        let image = render(&scene, &settings);
+        let expected = 1.0 / (height * height);
+        let mean = image.color.iter().map(|pixel| pixel[0]).sum::<f32>() / image.color.len() as f32;
+        assert!((mean / expected - 1.0).abs() < 1e-3, "{radius} at {height}: {mean}");
+    }
 }
 
 /// The light of a directional punctual light comes from one direction, whatever its radius.

@@ -16,7 +16,7 @@ use surfel_core::points::{
 };
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{ColorSource, choose_source, colorize};
-use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
+use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, PART, Transform};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::words::counted;
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
@@ -47,10 +47,15 @@ pub fn import(
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
     let content = options.memory.get(file);
-    let loaded = match content {
+    let mut loaded = match content {
         Some(content) => import_from_memory(content, settings, options, progress)?,
         None => import_from_file(file, settings, options, progress)?,
     };
+    for geometry in &mut loaded.0.geometries {
+        if let Geometry::Points(cloud) = geometry {
+            cloud.scalars.retain(|scalar| scalar.name != PART);
+        }
+    }
     match content {
         // Rays that meet them are in their coordinates.
         Some(MemoryContent::Points(cloud, system)) => {

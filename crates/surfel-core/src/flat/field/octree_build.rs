@@ -41,7 +41,7 @@ impl Octree {
     /// Builds an octree over points.
     ///
     /// The result does not depend on the number of threads. It takes at most `MAX_OCTREE_BYTES_PER_POINT` bytes a point
-    /// or 64 cells, for which deeper levels are left out.
+    /// or 64 cells, for which deeper levels are left out; a warning says so if they were asked for.
     ///
     /// # Errors
     ///
@@ -51,16 +51,24 @@ impl Octree {
         options: &OctreeOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        match options.has_corners {
+        let tree = match options.has_corners {
             true => {
                 let (tree, corners) = build::<CellCorners>(points, options, progress)?;
-                Ok(Self { corners, ..tree })
+                Self { corners, ..tree }
             }
             false => {
                 let (tree, planes) = build::<CellPlane>(points, options, progress)?;
-                Ok(Self { planes, ..tree })
+                Self { planes, ..tree }
             }
+        };
+        if let OctreeDepth::Levels(wanted) = options.depth
+            && tree.cube.is_some()
+            && tree.depth < wanted as usize
+        {
+            let line = format!("the octree has {} levels: more take too much memory", tree.depth);
+            progress.warning(&line, &["octree_depth"]);
         }
+        Ok(tree)
     }
 }
 
@@ -88,7 +96,7 @@ fn build<C: OctreeCell>(
     // A cell has a node, and its share of the nodes above.
     let cell_bytes = size_of::<C>() + 2 * size_of::<OctreeNode>();
     let n_left = AtomicUsize::new((n_bytes / cell_bytes).max(MIN_CELLS));
-    progress.begin("build octree", depth as u64);
+    progress.begin("build octree", depth as u64 + 1);
     let cells_of = |level: usize, is_deepest: bool| {
         let cell_size = side / (level as f32).exp2();
         let field = field.widened(MIN_LEVEL_SUPPORT * cell_size);

@@ -1,10 +1,9 @@
 //! Cleaning: drops points and marks entries that no later step can use, and counts them.
 
 use super::clean_options::{CleanOptions, Duplicates, NoisePoints};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::is_valid_position;
-use crate::points::{PointCloud, Values, WITHHELD};
+use crate::points::{PointCloud, Values, WITHHELD, check_count, is_valid_position};
 use crate::progress::Progress;
 use crate::words::counted;
 use rayon::prelude::*;
@@ -109,10 +108,7 @@ fn find_dropped(
     report: &mut CleanReport,
 ) -> Result<Vec<u32>> {
     let positions = &cloud.positions;
-    let limit = u32::MAX as usize;
-    if limit <= positions.len() {
-        return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
-    }
+    check_count(positions.len())?;
     progress.check()?;
     let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
     // Points of a model may be at zero at rest.

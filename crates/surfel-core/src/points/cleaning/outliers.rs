@@ -35,14 +35,15 @@ impl OutlierRemoval {
     const DEFAULT_RATIO: f32 = 2.0;
 
     fn check(self) -> Result<()> {
+        let is_count = |count: usize| (1..1 << 20).contains(&count);
         let (good, expected) = match self {
             Self::Statistical { k, ratio } => (
-                0 < k && 0.0 < ratio && ratio.is_finite(),
-                "statistical:K,RATIO with K of at least 1 and a positive RATIO",
+                is_count(k) && 0.0 < ratio && ratio.is_finite(),
+                "statistical:K,RATIO with K from 1 to a million and a positive RATIO",
             ),
             Self::Radius { radius, count } => (
-                0 < count && 0.0 < radius && radius.is_finite(),
-                "radius:DISTANCE,COUNT with a positive DISTANCE and COUNT of at least 1",
+                is_count(count) && 0.0 < radius && radius.is_finite(),
+                "radius:DISTANCE,COUNT with a positive DISTANCE and COUNT from 1 to a million",
             ),
         };
         if good {

@@ -121,7 +121,7 @@ pub fn name_of_pdal(name: &str) -> Option<&'static str> {
 
 /// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
 pub fn plain_name(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()
+    name.chars().filter(|letter| letter.is_alphanumeric()).collect::<String>().to_lowercase()
 }
 
 #[cfg(test)]

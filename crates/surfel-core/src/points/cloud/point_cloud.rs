@@ -2,6 +2,7 @@
 
 use super::deformation::{Morph, Skin, pick};
 use super::scan_station::{STATION, ScanStation};
+use crate::error::{Error, Result};
 use crate::math::{Aabb, DVec3, Vec3, median};
 
 /// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
@@ -11,6 +12,15 @@ const MAX_COORDINATE: f32 = 1e15;
 /// Returns true if all coordinates are numbers below 1e15 in magnitude.
 pub fn is_valid_position(position: Vec3) -> bool {
     position.abs().cmplt(Vec3::splat(MAX_COORDINATE)).all()
+}
+
+/// Fails if 32-bit indices do not suffice for so many points. The largest index marks an unused entry.
+pub(crate) fn check_count(n_points: usize) -> Result<()> {
+    let limit = u32::MAX as usize;
+    if limit <= n_points {
+        return Err(Error::TooManyPoints { found: n_points, limit: limit - 1 });
+    }
+    Ok(())
 }
 
 /// A point cloud as columns. Every column that is present has one entry for each position.

@@ -72,7 +72,8 @@ impl<'a> SeenScan<'a> {
         progress.check()?;
         let mut is_near_jump = jumps(&ranges, grid.n_columns);
         is_near_jump.par_chunks_mut(grid.n_columns).for_each(|row| dilate(row, 1));
-        (0..grid.n_columns).for_each(|column| dilate(&mut is_near_jump[column..], grid.n_columns));
+        progress.check()?;
+        dilate(&mut is_near_jump, grid.n_columns);
         Ok(Some(Self { grid, rays, ranges, is_near_jump }))
     }
 
@@ -204,21 +205,25 @@ fn jumps(ranges: &[f32], n_columns: usize) -> Vec<bool> {
     ranges.par_iter().enumerate().map(is_jump).collect()
 }
 
-/// Sets all flags within reach of one that is set, among those that are `stride` apart.
-fn dilate(flags: &mut [bool], stride: usize) {
-    let count = flags.len().div_ceil(stride);
-    let mut reached = vec![false; count];
+/// Sets all flags within reach of one that is set, along each column of rows of `n_columns` flags.
+fn dilate(flags: &mut [bool], n_columns: usize) {
+    let n_rows = flags.len() / n_columns;
+    let mut reached = vec![false; flags.len()];
     for is_backward in [false, true] {
-        let mut last = None;
-        for step in 0..count {
-            let i = if is_backward { count - 1 - step } else { step };
-            if flags[i * stride] {
-                last = Some(step);
+        let mut last = vec![None; n_columns];
+        for step in 0..n_rows {
+            let row = if is_backward { n_rows - 1 - step } else { step };
+            let cells = row * n_columns..(row + 1) * n_columns;
+            let row = flags[cells.clone()].iter().zip(&mut reached[cells]);
+            for ((is_set, is_reached), last) in row.zip(&mut last) {
+                if *is_set {
+                    *last = Some(step);
+                }
+                *is_reached |= last.is_some_and(|last| step - last <= MAX_REACH + 1);
             }
-            reached[i] |= last.is_some_and(|last| step - last <= MAX_REACH + 1);
         }
     }
-    reached.iter().enumerate().for_each(|(i, is_reached)| flags[i * stride] = *is_reached);
+    flags.copy_from_slice(&reached);
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Cells as wide as the neighbour distance.
 
-use super::neighbor::check_count;
 use crate::error::Result;
 use crate::math::Vec3;
+use crate::points::check_count;
 use rayon::prelude::*;
 
 /// A grid of cells so wide that points within a distance lie at most one cell apart along each axis.
@@ -28,7 +28,7 @@ impl CellGrid {
 
 /// Returns the indices of the finite positions. Fails if 32-bit indices do not suffice.
 pub(super) fn finite_indices(positions: &[Vec3]) -> Result<Vec<u32>> {
-    check_count(positions)?;
+    check_count(positions.len())?;
     let is_finite = |&i: &u32| positions[i as usize].is_finite();
     Ok((0..positions.len() as u32).into_par_iter().filter(is_finite).collect())
 }

@@ -1,9 +1,10 @@
 //! A balanced kd-tree without pointers.
 
 use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest, NearestSet};
-use super::neighbor::{Neighbor, check_count, key};
+use super::neighbor::{Neighbor, key};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3, Vec4, set_bits};
+use crate::points::check_count;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -68,7 +69,7 @@ impl<'a> KdTree<'a> {
     /// Returns [`Error::TooManyPoints`](crate::Error::TooManyPoints) beyond 32-bit indices and
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
     pub fn new(positions: &'a [Vec3], progress: &dyn Progress) -> Result<Self> {
-        check_count(positions)?;
+        check_count(positions.len())?;
         let n_points = positions.par_iter().filter(|p| p.is_finite()).count();
         let empty = Entry { position: Vec3::NAN, index: u32::MAX };
         let n_leaves = n_points.div_ceil(LANES);

@@ -43,15 +43,6 @@ pub(super) fn neighbor(key: u64) -> Neighbor {
     Neighbor { index: key as u32, distance_squared: f32::from_bits((key >> 32) as u32) }
 }
 
-/// Fails if 32-bit indices do not suffice. The largest index marks an unused entry.
-pub(super) fn check_count(positions: &[Vec3]) -> Result<()> {
-    let limit = u32::MAX as usize;
-    if limit <= positions.len() {
-        return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
-    }
-    Ok(())
-}
-
 /// Returns the square of a distance. Fails unless it is a normal number, whose rounding error does not matter.
 pub(super) fn checked_square(distance: f32) -> Result<f32> {
     let square = distance * distance;

@@ -117,12 +117,16 @@ impl Radius {
         let (good, found) = match self {
             Self::Fixed(radius) => (0.0 < radius && radius < f32::INFINITY, radius.to_string()),
             Self::Median { n, samples } => {
-                (0 < n && 0 < samples && n < 1 << 20, format!("median:{n} of {samples} samples"))
+                let is_count = |count: usize| (1..1 << 20).contains(&count);
+                // The neighbours of all samples are in memory at once.
+                let is_small = n.saturating_mul(samples) <= 1 << 26;
+                let good = is_count(n) && is_count(samples) && is_small;
+                (good, format!("median:{n} of {samples} samples"))
             }
             Self::Adaptive { k } => ((1..1 << 20).contains(&k), format!("adaptive:{k}")),
             Self::Curvature { k } => ((1..1 << 20).contains(&k), format!("curvature:{k}")),
         };
-        let expected = "positive and finite, counts from 1 to a million";
+        let expected = "positive and finite, counts from 1 to a million, at most 67 million neighbours of all samples";
         if good { Ok(()) } else { Err(Error::Setting { name: "radius", found, expected }) }
     }
 }
@@ -443,6 +447,8 @@ mod tests {
             "adaptive:0",
             "median:x",
             "median:6,0",
+            "median:6,20000000",
+            "median:500000,1000",
             "median:6,",
             "auto:3",
             "mean",

@@ -43,7 +43,6 @@ pub fn without_mixed_pixels(
     let Some(grids) = ScanGrids::new(cloud, progress)? else { return Ok(None) };
     let mut mixed: Vec<u32> = Vec::new();
     for grid in grids.scans.iter().flatten() {
-        let cells: Vec<([usize; 2], usize)> = grid.cells().collect();
         let is_mixed = |([row, column], _): &&([usize; 2], usize)| {
             let lines = [[1, 0], [0, 1]].map(|step| GridLine {
                 grid,
@@ -53,8 +52,13 @@ pub fn without_mixed_pixels(
             });
             lines.iter().any(GridLine::is_mixed)
         };
-        for cells in cells.chunks(1 << 20) {
+        let mut cells = grid.cells();
+        loop {
             progress.check()?;
+            let cells: Vec<([usize; 2], usize)> = cells.by_ref().take(1 << 20).collect();
+            if cells.is_empty() {
+                break;
+            }
             mixed.par_extend(cells.par_iter().filter(is_mixed).map(|(_, point)| *point as u32));
         }
     }

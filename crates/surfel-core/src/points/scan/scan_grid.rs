@@ -5,6 +5,7 @@ use crate::math::{DQuat, DVec3, Vec3};
 use crate::points::cloud::point_cloud::ScanOfPoint;
 use crate::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, Values, is_valid_position};
 use crate::progress::Progress;
+use rayon::prelude::*;
 
 /// Marks a ray without a point.
 pub const NO_POINT: u32 = u32::MAX;
@@ -107,13 +108,19 @@ impl ScanGrid {
     /// Returns true if most points have most of their eight neighbours, as in a scan of which no points were left out.
     pub fn is_dense(&self) -> bool {
         const MIN_NEIGHBORS: usize = 4;
-        let (mut n_points, mut n_neighbors) = (0, 0);
-        for ([row, column], _) in self.cells() {
-            let (row, column) = (row as isize, column as isize);
-            let around = (0..9).map(|i| self.point(row + i / 3 - 1, column + i % 3 - 1));
-            n_points += 1;
-            n_neighbors += around.flatten().count() - 1;
-        }
+        let of_row = |row: usize| {
+            let row = row as isize;
+            let columns = 0..self.n_columns as isize;
+            let columns = columns.filter(|column| self.point(row, *column).is_some());
+            let n_neighbors = columns.map(|column| {
+                let around = (0..9).map(|i| self.point(row + i / 3 - 1, column + i % 3 - 1));
+                around.flatten().count() - 1
+            });
+            n_neighbors.fold((0, 0), |(n_points, n_neighbors), n| (n_points + 1, n_neighbors + n))
+        };
+        let add = |a: (usize, usize), b: (usize, usize)| (a.0 + b.0, a.1 + b.1);
+        let rows = (0..self.n_rows).into_par_iter();
+        let (n_points, n_neighbors) = rows.map(of_row).reduce(|| (0, 0), add);
         MIN_NEIGHBORS * n_points <= n_neighbors
     }
 

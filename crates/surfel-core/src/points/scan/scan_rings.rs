@@ -4,7 +4,7 @@
 //! other, or from elevations that repeat.
 
 use crate::error::Result;
-use crate::math::{DVec3, Vec3, sampled_quantile};
+use crate::math::{DVec3, Vec3, sample_indices, sampled_quantile};
 use crate::points::{PointCloud, ROW_INDEX, Values, is_valid_position};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -103,12 +103,15 @@ impl ScanRings {
             })
         };
         // Most clouds have none, which some points tell.
-        let step = cloud.len().div_ceil(N_SAMPLES);
-        let spread_sample: Vec<_> = cloud.positions.iter().step_by(step).map(direction).collect();
+        let spread: Vec<usize> = sample_indices(cloud.len(), N_SAMPLES).collect();
+        let spread_sample: Vec<_> =
+            spread.iter().map(|i| direction(&cloud.positions[*i])).collect();
         let first_sample: Vec<_> = cloud.positions.iter().take(N_SAMPLES).map(direction).collect();
         let mut columns = RING_COLUMNS.into_iter().filter_map(|name| cloud.scalar(name));
-        let column =
-            columns.find(|values| rings(&spread_sample, &by_column(values, step)).is_some());
+        let is_of_rings = |values: &&Values| {
+            rings(&spread_sample, &by_column(values, spread.iter().copied())).is_some()
+        };
+        let column = columns.find(is_of_rings);
         let mut samples = [&spread_sample, &first_sample].into_iter();
         if column.is_none()
             && samples.all(|sample| by_elevation(sample).is_none())
@@ -119,7 +122,8 @@ impl ScanRings {
         progress.check()?;
         let directions: Vec<_> = cloud.positions.par_iter().map(direction).collect();
         progress.check()?;
-        let of_column = column.and_then(|values| rings(&directions, &by_column(values, 1)));
+        let of_column =
+            column.and_then(|values| rings(&directions, &by_column(values, 0..values.len())));
         if let Some(rings) = of_column {
             return Ok(Some(Self { scanner, rings }));
         }
@@ -216,21 +220,21 @@ fn have_jumps(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
     MIN_WITH_JUMPS * rings.len() as f32 <= rings.iter().filter(has_jump).count() as f32
 }
 
-/// Returns the rings of each `step`-th point by a column of the file.
-fn by_column(values: &Values, step: usize) -> Vec<u16> {
+/// Returns the rings of points by a column of the file.
+fn by_column(values: &Values, points: impl IntoIterator<Item = usize>) -> Vec<u16> {
     let ring = |point: usize| {
         let value = values.get(point);
         let is_index = value.fract() == 0.0 && (0.0..MAX_RINGS as f64).contains(&value);
         if is_index { value as u16 } else { NO_RING }
     };
-    (0..values.len()).step_by(step).map(ring).collect()
+    points.into_iter().map(ring).collect()
 }
 
 /// Returns the rings of the points by their elevations, if these repeat.
 fn by_elevation(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
     let elevations = directions.iter().flatten().map(|direction| direction.elevation_deg);
     let mut sorted: Vec<f32> = elevations.collect();
-    sorted.sort_unstable_by(f32::total_cmp);
+    sorted.par_sort_unstable_by(f32::total_cmp);
     let bounds = MIN_STEPS_DEG.into_iter().find_map(|step| bounds_of_rings(&sorted, step))?;
     let ring = |direction: &Option<Direction>| {
         let Some(Direction { elevation_deg, .. }) = *direction else { return NO_RING };
@@ -238,7 +242,7 @@ fn by_elevation(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
         let is_within = bounds.get(ring).is_some_and(|[first, _]| *first <= elevation_deg);
         if is_within { ring as u16 } else { NO_RING }
     };
-    Some(directions.iter().map(ring).collect())
+    Some(directions.par_iter().map(ring).collect())
 }
 
 /// Returns the first and the last elevation of each ring; none if the elevations do not form rings when they are parted

@@ -1,11 +1,10 @@
 //! The automatic choice of a source of colours: one that shows the surface, not noise.
 
 use super::source::ColorSource;
-use crate::math::{Random, Vec3};
+use crate::math::{Random, Vec3, sample_indices};
 use crate::points::PointCloud;
 use crate::points::neighbors::nearest_by_brute_force;
 use crate::scene::inlier_bounds;
-use crate::scene::sample::sample_indices;
 use rayon::prelude::*;
 
 /// sRGB-encoded colour of clouds without colours: light stone, for white objects glare and a cold grey looks

@@ -149,7 +149,8 @@ impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> 
         let all = keeps_all.then(|| self.discs.spare.pop().unwrap_or_default());
         let length = self.consumer.length();
         let (gather, shape) = (Gather::EMPTY, PhantomData);
-        GatherRayVisitor { ray, gather, all, length, limit: ray.t_max, shape }
+        let capacity = HitCapacity::of(self.consumer.max_discs());
+        GatherRayVisitor { ray, gather, all, capacity, length, limit: ray.t_max, shape }
     }
 
     #[inline(always)]
@@ -160,7 +161,8 @@ impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> 
         let hits = std::mem::take(&mut self.discs.hits);
         let length = self.consumer.length();
         let limits = packet.initial_limits();
-        GatherPacketVisitor { packet, length, limits, hits, shape: PhantomData }
+        let capacity = HitCapacity::of(self.consumer.max_discs());
+        GatherPacketVisitor { packet, length, limits, hits, capacity, shape: PhantomData }
     }
 
     #[inline(always)]
@@ -196,6 +198,46 @@ impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> 
     }
 }
 
+/// The number of hits from which on those that cannot be among the result are dropped, so that discs over each other in
+/// any number take little memory.
+#[derive(Clone, Copy)]
+struct HitCapacity {
+    /// Maximum number of discs of a ray in the result.
+    max_discs: usize,
+    n_hits: usize,
+}
+
+impl HitCapacity {
+    /// Number of hits that are kept without a look at them.
+    const MIN_HITS: usize = 1 << 14;
+
+    fn of(max_discs: usize) -> Self {
+        Self { max_discs, n_hits: Self::MIN_HITS }
+    }
+
+    /// Drops hits of a ray that lie beyond a limit or are not among the nearest.
+    #[cold]
+    fn shrink_ray(&mut self, hits: &mut Vec<Hit>, limit: f32) {
+        hits.retain(|hit| hit.distance <= limit);
+        if self.max_discs < hits.len() {
+            hits.select_nth_unstable_by_key(self.max_discs, Hit::key);
+            hits.truncate(self.max_discs);
+        }
+        self.n_hits = Self::MIN_HITS.max(2 * hits.len());
+    }
+
+    /// Drops hits of a packet as [`HitCapacity::shrink_ray`] does.
+    #[cold]
+    fn shrink_packet<W: PacketLanes>(
+        &mut self,
+        hits: &mut Vec<PacketDiscHit>,
+        limits: &[f32; PACKET_WIDTH],
+    ) {
+        cull_and_sort::<W>(hits, limits, self.max_discs);
+        self.n_hits = Self::MIN_HITS.max(2 * hits.len());
+    }
+}
+
 /// The search for the discs that a ray hits.
 pub struct GatherRayVisitor<'r, S> {
     ray: &'r Ray,
@@ -203,6 +245,8 @@ pub struct GatherRayVisitor<'r, S> {
     gather: Gather,
     /// All discs, if more than a `Gather` holds are wanted; `gather` is then empty.
     all: Option<Vec<Hit>>,
+    /// Maximum number of hits in `all`.
+    capacity: HitCapacity,
     length: Option<f32>,
     limit: f32,
 }
@@ -230,6 +274,9 @@ impl<S: Shape> RayVisitor for GatherRayVisitor<'_, S> {
                 self.limit = self.limit.min(gather_limit(hit.distance, length));
                 if let Some(all) = &mut self.all {
                     all.push(hit);
+                    if self.capacity.n_hits < all.len() {
+                        self.capacity.shrink_ray(all, self.limit);
+                    }
                     continue;
                 }
                 self.gather.insert(hit);
@@ -247,6 +294,7 @@ pub struct GatherPacketVisitor<'p, L: Lanes, S> {
     length: Option<f32>,
     limits: [f32; PACKET_WIDTH],
     hits: Vec<PacketDiscHit>,
+    capacity: HitCapacity,
     shape: PhantomData<S>,
 }
 
@@ -284,6 +332,9 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for GatherPacketVisitor<'_, L, S> {
         }
         self.hits.truncate(end);
         self.limits = limits.store();
+        if self.capacity.n_hits < end {
+            self.capacity.shrink_packet::<L::PacketLanes>(&mut self.hits, &self.limits);
+        }
     }
 
     #[inline(always)]
@@ -294,6 +345,9 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for GatherPacketVisitor<'_, L, S> {
             let length = self.length.unwrap_or(radius);
             self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, length));
             self.hits.push(PacketDiscHit::single(lane, hit));
+        }
+        if self.capacity.n_hits < self.hits.len() {
+            self.capacity.shrink_packet::<L::PacketLanes>(&mut self.hits, &self.limits);
         }
     }
 }

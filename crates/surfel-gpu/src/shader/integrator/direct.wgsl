@@ -97,23 +97,36 @@ fn environment_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u3
     return LightRay(direction, NO_LIMIT, contribution);
 }
 
+// As `lamp_ray` of the CPU.
 fn lamp_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u32) -> LightRay {
-    var lamp = light.position;
+    var offset = light.position - point.position;
+    var distance = length(offset);
+    var direction = offset / max(distance, 1e-30);
+    var t_max = distance;
+    var factor = 1.0;
     if 0.0 < light.radius {
-        // The visible half of the ball appears as a disc that faces the shading point.
         let dimension = hash(vec2<u32>(PUNCTUAL_LIGHT_POSITION ^ (light.lamp << 8u), light.lamp >> 24u));
-        let on_disk = disk(owen_sobol_2d(sample_idx, hash(point.key ^ dimension)));
-        let toward = point.position - lamp;
-        let squared = dot(toward, toward);
-        let axis = select(vec3<f32>(0.0, 0.0, 1.0), toward / sqrt(max(squared, 1e-30)), 1e-30 < squared);
-        let basis = basis_around(axis);
-        lamp += light.radius * (on_disk.x * basis.tangent + on_disk.y * basis.bitangent);
+        let uv = owen_sobol_2d(sample_idx, hash(point.key ^ dimension));
+        let basis = basis_around(select(vec3<f32>(0.0, 0.0, 1.0), direction, 0.0 < distance));
+        if distance <= light.radius {
+            // Within the ball, light comes from the disc through its centre.
+            let on_disk = disk(uv);
+            offset += light.radius * (on_disk.x * basis.tangent + on_disk.y * basis.bitangent);
+            distance = length(offset);
+            direction = offset / max(distance, 1e-30);
+            t_max = 0.5 * distance;
+        } else {
+            let sine = light.radius / distance;
+            let cos_max = sqrt(1.0 - sine * sine);
+            let local = uniform_cone(uv, cos_max);
+            direction = basis_to_world(basis, local);
+            // Over the cone, the cosine at the surface has the mean (1 + cos_max) / 2.
+            factor = 2.0 / (1.0 + cos_max);
+            let aside = distance * length(local.xy);
+            t_max = distance * local.z - sqrt(max(light.radius * light.radius - aside * aside, 0.0));
+        }
     }
-    let offset = lamp - point.position;
-    let distance = length(offset);
-    let direction = offset / max(distance, 1e-30);
-    let strength = lamp_falloff(light, -direction, distance);
-    let t_max = distance - min(light.radius, 0.5 * distance);
+    let strength = factor * lamp_falloff(light, -direction, distance);
     return LightRay(direction, t_max, reflected_radiance(point, direction, strength * light.color));
 }
 

@@ -101,7 +101,9 @@ fn albedo_value(idx: u32) -> f32 {
 // Returns the GGX BRDF without its Fresnel term, with energy compensation.
 fn ggx_specular(cos_view: f32, cos_light: f32, cos_half: f32, roughness: f32) -> f32 {
     let alpha = ggx_alpha(roughness);
-    let squared = cos_half * cos_half * (alpha * alpha - 1.0) + 1.0;
+    // As on the CPU, without a difference of almost equal numbers.
+    let cos_squared = min(cos_half * cos_half, 1.0);
+    let squared = (1.0 - cos_squared) + cos_squared * alpha * alpha;
     let density = alpha * alpha / (PI * squared * squared);
     let masking = smith_g2_over_g1(cos_view, cos_light, roughness) * smith_g1(cos_view, alpha);
     return density * masking / (4.0 * cos_view * cos_light) / directional_albedo(cos_view, roughness);

@@ -2,7 +2,7 @@
 
 use super::condition::{Condition, Operand, Relation};
 use crate::error::{Error, Result};
-use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values, name_of_pdal};
+use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values, name_of_pdal, plain_name};
 use std::ops::Range;
 
 /// The greatest channel of a colour of 8 bits. A channel that is compared with a greater number has 16 bits.
@@ -190,10 +190,10 @@ fn widen<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {
 }
 
 fn find_column<'a>(name: &str, cloud: &'a PointCloud) -> Result<ColumnValues<'a>> {
-    let wanted = plain(name);
+    let wanted = plain_name(name);
     let scalars = cloud.scalars.iter();
-    let scalar = |wanted: &str| scalars.clone().find(|scalar| plain(&scalar.name) == wanted);
-    let found = scalar(&wanted).or_else(|| scalar(&plain(name_of_pdal(name)?)));
+    let scalar = |wanted: &str| scalars.clone().find(|scalar| plain_name(&scalar.name) == wanted);
+    let found = scalar(&wanted).or_else(|| scalar(&plain_name(name_of_pdal(name)?)));
     if let Some(scalar) = found {
         return Ok(ColumnValues::Scalar(&scalar.values));
     }
@@ -216,9 +216,4 @@ fn is_present(column: KnownColumn, cloud: &PointCloud) -> bool {
         KnownColumn::Intensity => cloud.intensity.is_some(),
         KnownColumn::Classification => cloud.classification.is_some(),
     }
-}
-
-/// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
-fn plain(name: &str) -> String {
-    name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase()
 }

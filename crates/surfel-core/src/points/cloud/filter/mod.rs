@@ -193,6 +193,18 @@ mod tests {
     }
 
     #[test]
+    fn columns_of_any_script_are_told_apart() {
+        let mut cloud = cloud();
+        for (name, values) in [("密度", vec![1, 1, 5, 5]), ("高度", vec![1, 9, 1, 9])] {
+            cloud.scalars.push(Scalar { name: name.into(), values: Values::U8(values) });
+        }
+        let matches =
+            |filter: &str| filter.parse::<PointFilter>().unwrap().matches(&cloud, 0).unwrap();
+        assert_eq!(matches("密度[1:2],高度[0:5]"), [true, false, false, false]);
+        assert_eq!(matches("密度[1:2],密度[5:5],高度[0:5]"), [true, false, true, false]);
+    }
+
+    #[test]
     fn ranges_are_those_of_pdal() {
         assert_eq!(kept("Classification[2:5]"), [0, 2, 3]);
         assert_eq!(kept("Z(1000:1002]"), [1, 2]);
