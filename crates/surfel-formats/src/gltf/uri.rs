@@ -3,8 +3,8 @@
 use std::ops::Deref;
 use std::path::PathBuf;
 
-use super::json::{Json, shorten};
-use crate::error::{Error, Result};
+use super::json::Json;
+use crate::error::{Error, Result, shorten};
 use crate::file::{Input, ResourceResolver};
 
 /// Bytes of a buffer or image and their storage.
