@@ -11,12 +11,17 @@ pub fn check_picture(path: &Path) -> anyhow::Result<()> {
     surfel_formats::check_image_output(path).map_err(usage_error)
 }
 
+/// Fails if a picture has more pixels than its format holds.
+pub fn check_picture_size(path: &Path, (width, height): (u32, u32)) -> anyhow::Result<()> {
+    surfel_formats::check_image_size(path, width, height).map_err(usage_error)
+}
+
 /// Fails where a cloud could not be written.
 pub fn check_cloud(path: &Path) -> anyhow::Result<()> {
     surfel_formats::check_cloud_output(path).map_err(usage_error)
 }
 
-/// Takes an extension or a pipe that cannot be written for an error of usage.
+/// Takes an extension, a size or a pipe that cannot be written for an error of usage.
 fn usage_error(error: surfel_formats::Error) -> anyhow::Error {
     match error {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
