@@ -1,6 +1,7 @@
 //! PLY: all types, byte orders and header variants.
 
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
 
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::Values;
@@ -299,4 +300,21 @@ fn the_progress_of_faces_ends_at_its_total() {
         load_graph_bytes("a.ply", &file, &LoadOptions::default(), &stage).unwrap();
         assert_eq!(*stage.0.lock().unwrap(), (total, total));
     }
+}
+
+#[test]
+fn one_late_value_makes_words_colours_of_16_bits() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 50000\nproperty char x\n\
+        property char y\nproperty char z\nproperty ushort red\nproperty ushort green\n\
+        property ushort blue\nend_header\n";
+    let vertex = [0, 0, 0, 255, 0, 1, 0, 2, 0];
+    let mut bytes = binary(header, &vertex.repeat(50_000));
+    let color = |bytes: &[u8]| read("a.ply", bytes).unwrap().cloud.colors.unwrap()[0];
+    assert_eq!(color(&bytes), [65535, 257, 514]);
+    *bytes.last_mut().unwrap() = 1;
+    assert_eq!(color(&bytes), [255, 1, 2]);
+    let listener = Listener::default();
+    listener.cancelled.store(true, Ordering::Relaxed);
+    let cancelled = load_bytes("a.ply", &bytes, &LoadOptions::default(), &listener);
+    assert!(cancelled.unwrap_err().is_cancelled());
 }
