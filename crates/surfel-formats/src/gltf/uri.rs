@@ -1,7 +1,8 @@
 //! URIs of buffers and images: external files and `data:` URIs.
 
 use std::ops::Deref;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use super::json::Json;
 use crate::error::{Error, Result, shorten};
@@ -9,8 +10,8 @@ use crate::file::{Input, ResourceResolver};
 
 /// Bytes of a buffer or image and their storage.
 pub(super) enum BufferData<'a> {
-    /// An external file.
-    File(Input<'static>),
+    /// An external file, which several buffers may name.
+    File(Rc<Input<'static>>),
     /// Bytes decoded from a `data:` URI.
     DataUri(Vec<u8>),
     /// The buffer inside a GLB.
@@ -34,20 +35,20 @@ pub(super) fn is_data_uri(uri: &str) -> bool {
     strip_prefix_ignoring_case(uri, "data:").is_some()
 }
 
-/// Loads the bytes that the URI `reference` refers to: a `data:` URI or a file relative to the glTF file.
+/// Returns the bytes of the `data:` URI `reference`.
+pub(super) fn read_data_uri(reference: &Json) -> Result<Vec<u8>> {
+    let uri = reference.string()?;
+    strip_prefix_ignoring_case(uri, "data:").and_then(decode_data_uri).ok_or_else(|| {
+        reference.error(format!("`{}`", shorten(uri)), "`data:` and bytes in Base64")
+    })
+}
+
+/// Returns the path of the file that the URI `reference` refers to, relative to the glTF file.
 ///
 /// Relative paths may contain `..`. Absolute paths and network addresses are rejected, because they would
 /// make the image depend on the machine.
-pub(super) fn load_uri<'a>(
-    resolver: &ResourceResolver,
-    reference: &Json<'a>,
-) -> Result<BufferData<'a>> {
+pub(super) fn file_path(resolver: &ResourceResolver, reference: &Json) -> Result<PathBuf> {
     let uri = reference.string()?;
-    if let Some(data) = strip_prefix_ignoring_case(uri, "data:") {
-        return decode_data_uri(data).map(BufferData::DataUri).ok_or_else(|| {
-            reference.error(format!("`{}`", shorten(uri)), "`data:` and bytes in Base64")
-        });
-    }
     let unsupported = |advice| Error::Unsupported {
         file: reference.file().into(),
         action: "read",
@@ -63,7 +64,13 @@ pub(super) fn load_uri<'a>(
         return Err(unsupported("copy the file into the folder and write its relative path"));
     }
     let paths = candidate_paths(uri).map(|path| folder.join(path));
-    Input::open(resolver.choose(&paths)).map(BufferData::File).map_err(|error| match error {
+    Ok(resolver.choose(&paths).to_owned())
+}
+
+/// Opens the file at `path`, which the URI `reference` refers to.
+pub(super) fn open_file(path: &Path, reference: &Json) -> Result<Input<'static>> {
+    let uri = reference.string()?;
+    Input::open(path).map_err(|error| match error {
         Error::Io { file, cause, .. } => {
             let found = format!("`{}`, and {file} cannot be read ({cause})", shorten(uri));
             reference.error(found, "a file beside this one, copied along with it")
