@@ -79,13 +79,16 @@ pub(super) fn open_file(path: &Path, reference: &Json) -> Result<Input<'static>>
     })
 }
 
-/// Returns true if a URI begins with a scheme (`https:`), a drive (`C:`) or the root.
+/// Returns true if a URI begins with a scheme (`https:`), a drive (`C:`) or the root, the latter two also in escapes.
 fn is_absolute(uri: &str) -> bool {
+    let decoded = decode_percent(uri);
+    // The escapes of a scheme make it a part of a name, as in `a%3Ab.png`.
+    let is_drive = matches!(*decoded, [letter, b':', ..] if letter.is_ascii_alphabetic());
     let scheme = uri.split(['/', '\\', '?', '#']).next().unwrap_or_default();
     let scheme = scheme.split_once(':').map_or("", |(scheme, _)| scheme);
     let is_scheme = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
-    is_scheme || uri.starts_with(['/', '\\']) || decode_percent(uri).starts_with(b"/")
+    is_scheme || is_drive || matches!(decoded.first(), Some(b'/' | b'\\'))
 }
 
 /// Returns the paths that a URI may mean, most likely first: percent-decoded as the standard requires,
@@ -184,10 +187,30 @@ mod tests {
 
     #[test]
     fn absolute_uris_are_distinguished_from_relative_ones() {
-        for uri in ["/a", "\\\\server\\a", "C:\\a.bin", "http://a/b", "file:a", "%2Fetc/a"] {
+        for uri in [
+            "/a",
+            "\\\\server\\a",
+            "C:\\a.bin",
+            "http://a/b",
+            "file:a",
+            "%2Fetc/a",
+            "C%3A/secrets/a.png",
+            "%43%3a%5Ca.png",
+            "%5C%5Cserver%5Cshare%5Ca.png",
+            "%5Ca",
+        ] {
             assert!(is_absolute(uri), "{uri}");
         }
-        for uri in ["a.bin", "../a.bin", "a/b:c.bin", "ö:a", "a b.png", "1:2.png"] {
+        for uri in [
+            "a.bin",
+            "../a.bin",
+            "a/b:c.bin",
+            "ö:a",
+            "a b.png",
+            "1:2.png",
+            "ab%3Ac.png",
+            "a%5Cb.png",
+        ] {
             assert!(!is_absolute(uri), "{uri}");
         }
     }
