@@ -1,7 +1,6 @@
 //! Checks of output paths: a run fails before its work where the result could not be written after it.
 
 use crate::usage::Usage;
-use anyhow::bail;
 use std::path::{Path, PathBuf};
 
 /// Name of standard output.
@@ -9,17 +8,20 @@ const STDOUT: &str = "-";
 
 /// Fails where a picture could not be written.
 pub fn check_picture(path: &Path) -> anyhow::Result<()> {
-    surfel_formats::check_image_output(path).map_err(usage_error)?;
-    check_is_file(path)
+    surfel_formats::check_image_output(path).map_err(usage_error)
+}
+
+/// Fails if a picture has more pixels than its format holds.
+pub fn check_picture_size(path: &Path, (width, height): (u32, u32)) -> anyhow::Result<()> {
+    surfel_formats::check_image_size(path, width, height).map_err(usage_error)
 }
 
 /// Fails where a cloud could not be written.
 pub fn check_cloud(path: &Path) -> anyhow::Result<()> {
-    surfel_formats::check_cloud_output(path).map_err(usage_error)?;
-    check_is_file(path)
+    surfel_formats::check_cloud_output(path).map_err(usage_error)
 }
 
-/// Takes an extension that cannot be written for an error of usage.
+/// Takes an extension, a size or a pipe that cannot be written for an error of usage.
 fn usage_error(error: surfel_formats::Error) -> anyhow::Error {
     match error {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
@@ -29,8 +31,7 @@ fn usage_error(error: surfel_formats::Error) -> anyhow::Error {
 
 /// Fails where a height map could not be written.
 pub fn check_height_map(path: &Path) -> anyhow::Result<()> {
-    surfel_formats::check_height_map(path).map_err(usage_error)?;
-    check_is_file(path)
+    surfel_formats::check_height_map(path).map_err(usage_error)
 }
 
 /// Fails where the numbers of a run could not be written.
@@ -38,7 +39,6 @@ pub fn check_stats(path: &Path) -> anyhow::Result<()> {
     if path == Path::new(STDOUT) {
         return Ok(());
     }
-    check_is_file(path)?;
     Ok(surfel_formats::check_output_path(path)?)
 }
 
@@ -67,12 +67,4 @@ fn is_same_file(a: &Path, b: &Path) -> bool {
         Some(path.canonicalize().unwrap_or(folder.join(path.file_name()?)))
     };
     a == b || resolved(a).is_some_and(|a| Some(a) == resolved(b))
-}
-
-fn check_is_file(path: &Path) -> anyhow::Result<()> {
-    // A finished file is renamed to its name, and would replace a pipe or a device there.
-    if path.metadata().is_ok_and(|found| !found.is_file()) {
-        bail!("{}: is a device or a pipe; name a file", path.display());
-    }
-    Ok(())
 }

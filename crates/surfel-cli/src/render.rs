@@ -2,7 +2,9 @@
 
 use crate::global::{Global, check_device};
 use crate::options::Scope;
-use crate::output::{check_height_map, check_picture, check_replaces_nothing, check_stats};
+use crate::output::{
+    check_height_map, check_picture, check_picture_size, check_replaces_nothing, check_stats,
+};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use crate::stats::{self, RunStats, Seconds};
@@ -87,6 +89,7 @@ fn check_outputs(args: &Args, description: &SceneDescription, output: &Path) -> 
     let heights = description.plan.height_map.as_deref();
     let stats = args.stats.as_deref();
     check_picture(output)?;
+    check_picture_size(output, description.picture.resolution())?;
     stats.map_or(Ok(()), check_stats)?;
     heights.map_or(Ok(()), check_height_map)?;
     let others = [("--height-map", heights), ("--stats", stats)];
@@ -107,6 +110,8 @@ pub fn render_to_file(
     let read = || LoadedScene::read(description, KeepOptions::default(), report);
     let loaded = timed(&mut seconds.load, read)?;
     let auto = AutoSettings::choose(&loaded, description, report)?;
+    // The pixels of a plan are chosen from the data.
+    check_picture_size(output, auto.complete_description(&loaded).picture.resolution())?;
     let resolved = timed(&mut seconds.prepare, || loaded.into_resolved(auto, report))?;
     let counts = resolved.scene.graph.n_points_and_triangles();
     let mut scene = timed(&mut seconds.build, || resolved.build_trees(report))?;
@@ -160,6 +165,9 @@ fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Res
     let auto = AutoSettings::choose(&loaded, description, report)?;
     let mut complete = auto.complete_description(&loaded);
     complete.output.time = Some(description.output.time());
+    if let Some(output) = &description.output.output {
+        check_picture_size(output, complete.picture.resolution())?;
+    }
     Ok(print(&format!("{:#}", with_info(&complete, &loaded)))?)
 }
 

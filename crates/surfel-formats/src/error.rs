@@ -187,6 +187,15 @@ impl Error {
     }
 }
 
+/// Truncates a text of a file, which may be megabytes long, for a message.
+pub(crate) fn shorten(text: &str) -> String {
+    const MAX_CHARS: usize = 60;
+    match text.char_indices().nth(MAX_CHARS) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.into(),
+    }
+}
+
 /// Returns the number of points that a file claims, as the subject of a sentence.
 fn points_are(claimed: u64) -> String {
     let verb = if claimed == 1 { "is" } else { "are" };

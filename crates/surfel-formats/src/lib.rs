@@ -62,7 +62,7 @@ pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{is_scene, load_graph, load_graph_bytes};
 pub use image_file::{
     Alpha, BitDepth, EpsgCodes, Georeference, HeightMap, ImageOptions, check_height_map,
-    check_image_output, encode_png, save_height_map, save_image,
+    check_image_output, check_image_size, encode_png, save_height_map, save_image,
 };
 pub use load::{inspect, inspect_bytes, load, load_all, load_bytes};
 pub use merge::{common_file_info, merge_loaded};

@@ -2,7 +2,7 @@
 //! normals and texture coordinates; whatever follows is a colour.
 
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, Scalar, Values};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Material, Mesh};
 use surfel_core::words::counted;
@@ -21,9 +21,12 @@ const LINES_PER_CHECK: u64 = 1 << 16;
 const ADVICE: &str = "write the mesh again, as OFF of text or as PLY";
 
 /// The content of the first lines.
+#[derive(Default)]
 struct Header {
     has_normals: bool,
     has_uvs: bool,
+    /// True if vertices have colours; the lines of some files have them though the first word does not say so.
+    has_colors: bool,
     n_vertices: u64,
     n_faces: u64,
 }
@@ -46,6 +49,7 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let mut body = Body::open(input)?;
     let mut cloud = body.read_vertices(options, progress)?;
+    body.header.has_colors = cloud.colors.is_some();
     keep_matching(&mut cloud, 0, options.filter.as_ref())?;
     options.columns.drop_others(&mut cloud);
     Ok(Loaded { cloud, info: file_info(&body.header) })
@@ -62,6 +66,7 @@ pub(crate) fn read_mesh(
     let cloud = body.read_vertices(options, progress)?;
     let first_face = body.at;
     let (triangles, n_short) = body.read_faces(progress)?;
+    body.header.has_colors = cloud.colors.is_some();
     let colors = linear_colors(&cloud);
     let PointCloud { origin, positions, normals, .. } = cloud;
     let mesh = Mesh { origin, positions, triangles, normals, colors, ..Mesh::default() };
@@ -72,11 +77,18 @@ pub(crate) fn read_mesh(
 }
 
 fn file_info(header: &Header) -> FileInfo {
+    let present = [
+        (true, &["x", "y", "z"][..]),
+        (header.has_normals, &["nx", "ny", "nz"]),
+        (header.has_colors, &["red", "green", "blue"]),
+        (header.has_uvs, &["u", "v"]),
+    ];
+    let columns = present.iter().filter(|(is_present, _)| *is_present);
     FileInfo {
         format: "OFF".into(),
         n_points: Some(header.n_vertices),
         n_triangles: (0 < header.n_faces).then_some(header.n_faces),
-        columns: ["x", "y", "z"].map(String::from).into(),
+        columns: columns.flat_map(|(_, names)| *names).map(|name| (*name).into()).collect(),
         ..FileInfo::default()
     }
 }
@@ -92,8 +104,7 @@ struct Body<'a> {
 impl<'a> Body<'a> {
     /// Reads the header of a file.
     fn open(input: &'a Input<'a>) -> Result<Self> {
-        let header = Header { has_normals: false, has_uvs: false, n_vertices: 0, n_faces: 0 };
-        let mut body = Self { input, header, at: 0 };
+        let mut body = Self { input, header: Header::default(), at: 0 };
         let (start, line) = body.next_line().unwrap_or_default();
         let keyword = memchr::memmem::find(line, b"OFF").filter(|at| *at <= "STCN4n".len());
         let Some(keyword) = keyword else {
@@ -121,8 +132,13 @@ impl<'a> Body<'a> {
             let found = format!("{n_vertices} vertices");
             return Err(input.unsupported(found, "cut the mesh into several files"));
         }
-        let (has_normals, has_uvs) = (prefix.contains(&b'N'), prefix.starts_with(b"ST"));
-        body.header = Header { has_normals, has_uvs, n_vertices, n_faces };
+        body.header = Header {
+            has_normals: prefix.contains(&b'N'),
+            has_uvs: prefix.starts_with(b"ST"),
+            has_colors: prefix.contains(&b'C'),
+            n_vertices,
+            n_faces,
+        };
         Ok(body)
     }
 
@@ -150,6 +166,7 @@ impl<'a> Body<'a> {
         let Header { has_normals, has_uvs, n_vertices, .. } = self.header;
         let n_before_color = if has_normals { 6 } else { 3 };
         let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        let mut uvs = [Vec::new(), Vec::new()];
         progress.begin(&format!("read {}", self.input.name), n_vertices);
         self.for_each_line(n_vertices, progress, |numbers| {
             let n_uvs = if has_uvs { 2 } else { 0 };
@@ -161,19 +178,27 @@ impl<'a> Body<'a> {
             if has_normals {
                 normals.push(DVec3::new(numbers[3], numbers[4], numbers[5]).as_vec3());
             }
-            if let [r, g, b, ..] = numbers[n_before_color..numbers.len() - n_uvs] {
+            let (before, last) = numbers.split_at(numbers.len() - n_uvs);
+            if let [r, g, b, ..] = before[n_before_color..] {
                 colors.push([r, g, b]);
+            }
+            for (column, value) in uvs.iter_mut().zip(last) {
+                column.push(*value as f32);
             }
             Ok(())
         })?;
         let (origin, positions) = relative_to_origin(&positions, Tolerance::UNSTATED, options);
         let range = ColorRange::from_text(colors.as_flattened().iter().copied());
         let is_complete = !colors.is_empty() && colors.len() == positions.len();
+        let uvs = ["u", "v"].into_iter().zip(uvs).filter(|_| has_uvs);
+        let scalar =
+            |(name, values)| Scalar { name: String::from(name), values: Values::F32(values) };
         let to_16_bits = |color: &[f64; 3]| color.map(|v| (v * range.scale()).round() as u16);
         Ok(PointCloud {
             origin,
             normals: has_normals.then_some(normals),
             colors: is_complete.then(|| colors.iter().map(to_16_bits).collect()),
+            scalars: uvs.map(scalar).collect(),
             ..PointCloud::from_positions(positions)
         })
     }

@@ -18,7 +18,8 @@ pub struct LoadOptions {
     pub filter: Option<PointFilter>,
     /// World coordinates of the zero of the positions; chosen from the data if absent.
     pub origin: Option<DVec3>,
-    /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file.
+    /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX, text or ESRI grid file, and of the points of an OBJ
+    /// file.
     pub salvage: bool,
     /// Name of the animation to take from glTF files that have any; the first if absent.
     pub animation: Option<String>,

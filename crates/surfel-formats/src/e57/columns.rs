@@ -1,5 +1,7 @@
 //! The columns of a cloud that the fields of its scans become.
 
+use std::collections::HashSet;
+
 use e57::{ColorLimits, PointCloud, RecordDataType, RecordName, RecordValue};
 
 use super::values::Encoding;
@@ -25,16 +27,14 @@ pub(super) fn scan_columns(scan: &PointCloud) -> Vec<ScanColumn> {
     let find = |name: RecordName| scan.prototype.iter().position(|record| record.name == name);
     let invalid_color = find(RecordName::IsColorInvalid);
     let invalid_intensity = find(RecordName::IsIntensityInvalid);
-    let is_standard = |wanted: &ColumnRole| {
-        let is_extension = |name: &RecordName| matches!(name, RecordName::Unknown { .. });
-        let mut standard = scan.prototype.iter().filter(|record| !is_extension(&record.name));
-        standard.any(|record| role(&record.name).as_ref() == Some(wanted))
-    };
+    let names = scan.prototype.iter().map(|record| &record.name);
+    let standard = names.filter(|name| !matches!(name, RecordName::Unknown { .. }));
+    let standard_roles: HashSet<ColumnRole> = standard.filter_map(role).collect();
     let fields = scan.prototype.iter().enumerate();
     let columns = fields.filter_map(|(field, record)| {
         let role = match (role(&record.name)?, &record.name) {
             // An extension may hold another value of the same meaning, as a calibrated reflectance.
-            (taken, RecordName::Unknown { name, .. }) if is_standard(&taken) => {
+            (taken, RecordName::Unknown { name, .. }) if standard_roles.contains(&taken) => {
                 ColumnRole::Scalar(name.clone())
             }
             (role, _) => role,

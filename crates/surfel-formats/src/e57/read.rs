@@ -1,12 +1,13 @@
 //! Reads the points of all scans of a file.
 
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use surfel_core::words::counted;
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
 use surfel_core::points::locate_stations;
 use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::words::counted;
 
 use super::document::{Document, read_document, read_header, salvage_document};
 use super::images::embedded_images;
@@ -44,7 +45,7 @@ pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
         document => document?,
     };
     let scans = scans(input, &document)?;
-    let columns = columns(&scans);
+    let columns = columns(input, &scans)?;
     Ok(file_info(&document, &scans, &columns))
 }
 
@@ -59,22 +60,14 @@ pub(crate) fn read(
     let header =
         read_header(&mut salvage).map_err(|error| inspect(input).err().unwrap_or(error))?;
     let pages = Pages::new(&input[..header.length]);
-    let broken = pages.find_broken(progress)?;
-    if let Some(page) = broken.first() {
-        salvage.accept(input.malformed(
-            Location::Byte((page * PAGE_LENGTH) as u64),
-            "a page whose checksum is wrong",
-            "the bytes that were written",
-            "copy the file again from its source",
-        ))?;
-    }
+    let broken = find_broken(&mut salvage, pages, progress)?;
     let pages = pages.without(&broken);
     let document = match read_document(input, &header) {
         Err(_) if salvage.is_damaged() => salvage_document(input, &header, pages, progress)?,
         document => document?,
     };
     let scans = scans(input, &document)?;
-    let mut columns = columns(&scans);
+    let mut columns = columns(input, &scans)?;
     let mut info = file_info(&document, &scans, &columns);
     columns.retain(|(role, _)| options.columns.wants(role));
     let roles: Vec<ColumnRole> = columns.iter().map(|(role, _)| role.clone()).collect();
@@ -102,23 +95,45 @@ pub(crate) fn read(
     let n_claimed = document.is_described.then_some(n_claimed);
     salvage.report("point", n_points, n_claimed, progress)?;
     info.n_points = Some(n_points);
-    let n_invalid = reading.n_invalid.into_inner();
-    if 0 < n_invalid {
-        let line =
-            format!("skipped {n_invalid} of {}: no valid position", counted(n_points, "point"));
-        progress.note(&format!("{}: {line}", input.name));
-    }
+    note_invalid_points(input, reading.n_invalid.into_inner(), n_points, progress);
     let mut cloud = builder.finish();
     let stations = scans.iter().zip(&document.scans).enumerate();
     let stations = stations.map(|(i, (scan, description))| scan.station(i, description));
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
-    let n_located = locate_stations(&mut cloud);
+    note_located_stations(input, locate_stations(&mut cloud), progress);
+    Ok(Loaded { cloud, info })
+}
+
+/// Returns the indices of the pages whose checksums are wrong, which is accepted as damage.
+fn find_broken(salvage: &mut Salvage, pages: Pages, progress: &dyn Progress) -> Result<Vec<usize>> {
+    let broken = pages.find_broken(progress)?;
+    if let Some(page) = broken.first() {
+        salvage.accept(salvage.input.malformed(
+            Location::Byte((page * PAGE_LENGTH) as u64),
+            "a page whose checksum is wrong",
+            "the bytes that were written",
+            "copy the file again from its source",
+        ))?;
+    }
+    Ok(broken)
+}
+
+/// Says how many points have no valid position.
+fn note_invalid_points(input: &Input, n_invalid: u64, n_points: u64, progress: &dyn Progress) {
+    if 0 < n_invalid {
+        let points = counted(n_points, "point");
+        let line = format!("skipped {n_invalid} of {points}: no valid position");
+        progress.note(&format!("{}: {line}", input.name));
+    }
+}
+
+/// Says how many stations were found from the points.
+fn note_located_stations(input: &Input, n_located: usize, progress: &dyn Progress) {
     if 0 < n_located {
         let scans = counted(n_located, "scan");
         let line = format!("{scans} without a pose: the rays of the grid start at 0,0,0");
         progress.note(&format!("{}: {line}", input.name));
     }
-    Ok(Loaded { cloud, info })
 }
 
 /// State that the scans of a file share while they are read.
@@ -178,10 +193,7 @@ impl Reading<'_> {
 
 /// Returns the scans; fails if one has no coordinates or too many fields.
 fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
-    const ADVICE: &str = "write the file again";
-    let malformed = |found: String, expected: String| {
-        input.malformed(Location::Byte(0), found, expected, ADVICE)
-    };
+    let malformed = |found: String, expected: String| malformed(input, found, expected);
     if document.scans.is_empty() {
         return Err(malformed("no scans".into(), "points".into()));
     }
@@ -214,20 +226,33 @@ fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
     checked.collect()
 }
 
-/// Returns the columns of all scans and their types.
-fn columns(scans: &[Scan]) -> Vec<(ColumnRole, NumberType)> {
+/// Returns the error of descriptions that break the rules of the format.
+fn malformed(input: &Input, found: String, expected: String) -> Error {
+    input.malformed(Location::Byte(0), found, expected, "write the file again")
+}
+
+/// Returns the columns of all scans and their types; fails if there are too many.
+fn columns(input: &Input, scans: &[Scan]) -> Result<Vec<(ColumnRole, NumberType)>> {
     let mut columns: Vec<(ColumnRole, NumberType)> = Vec::new();
+    let mut column_of_role = HashMap::new();
     for column in scans.iter().flat_map(|scan| &scan.columns) {
-        match columns.iter_mut().find(|(role, _)| *role == column.role) {
+        let n_columns = columns.len();
+        let place = *column_of_role.entry(&column.role).or_insert(n_columns);
+        match columns.get_mut(place) {
             // Scans that store a column in different ways have it as f64.
             Some((_, number_type)) if *number_type != column.number_type => {
                 *number_type = NumberType::F64;
             }
             Some(_) => {}
+            // The work of each scan grows with the columns of all.
+            None if n_columns == MAX_FIELDS => {
+                let found = format!("more than {MAX_FIELDS} different columns in all scans");
+                return Err(malformed(input, found, format!("at most {MAX_FIELDS}")));
+            }
             None => columns.push((column.role.clone(), column.number_type)),
         }
     }
-    columns
+    Ok(columns)
 }
 
 /// Returns the layout of decoded records.

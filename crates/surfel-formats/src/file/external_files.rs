@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 
-use super::input::Input;
-
 /// Finds the files that a file names, and remembers which it looked for.
 pub(crate) struct ResourceResolver<'a> {
     /// Folder of the file that names others; `None` if its bytes do not come from disk.
@@ -45,11 +43,11 @@ impl<'a> ResourceResolver<'a> {
         self.requested.into_inner()
     }
 
-    /// Opens the file of this name, or returns the reason why it cannot.
+    /// Returns the path of the file of this name, found or not, or the reason why none is looked up.
     ///
     /// Programs write the paths of their own machine: if there is no file at the whole path, its last part is
     /// looked up in the folder.
-    pub fn open(&self, name: &str) -> Result<Input<'static>, String> {
+    pub fn find(&self, name: &str) -> Result<PathBuf, String> {
         let Some(folder) = self.folder else {
             return Err(format!(
                 "{name} is a separate file, and is not looked up for bytes in memory"
@@ -58,8 +56,15 @@ impl<'a> ResourceResolver<'a> {
         let path = name.replace('\\', "/");
         let last = path.rsplit('/').next().unwrap_or_default();
         let paths = [folder.join(&path), folder.join(last)];
-        Input::open(self.choose(&paths)).map_err(|error| error.to_string())
+        Ok(self.choose(&paths).to_owned())
     }
+}
+
+/// Returns a path that is the same for all names of a file; of a file that does not exist, the path itself.
+///
+/// Files are remembered by it: a file that is named in a thousand ways must not be read a thousand times.
+pub(crate) fn file_key(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 impl MissingFiles {

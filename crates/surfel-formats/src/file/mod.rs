@@ -10,6 +10,6 @@ pub use input::load_text;
 pub use output_path::check_output_path;
 
 pub(crate) use atomic_write::{write_error, write_file, write_temp};
-pub(crate) use external_files::{MissingFiles, ResourceResolver};
+pub(crate) use external_files::{MissingFiles, ResourceResolver, file_key};
 pub(crate) use input::Input;
 pub(crate) use output_path::{extension, unsupported_extension};

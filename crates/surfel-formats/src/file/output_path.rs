@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 ///
-/// Fails if the folder of `path` does not exist or takes no new files, or if `path` is a folder itself or ends as the name
-/// of one.
+/// Fails if the folder of `path` does not exist or takes no new files, if `path` is a folder itself or ends as the name
+/// of one, and if it is a pipe or a device.
 pub fn check_output_path(path: &Path) -> Result<()> {
     let folder = parent_folder(path);
     let ends_as_folder = path.to_string_lossy().ends_with(std::path::is_separator);
@@ -21,6 +21,15 @@ pub fn check_output_path(path: &Path) -> Result<()> {
     } else if !folder.is_dir() {
         std::io::ErrorKind::NotADirectory
     } else {
+        // A finished file is renamed to its name, and would replace a pipe or a device there.
+        if path.metadata().is_ok_and(|found| !found.is_file()) {
+            return Err(Error::Unsupported {
+                file: path.display().to_string(),
+                action: "write",
+                found: "a pipe or device, not a regular file".into(),
+                advice: "name a file",
+            });
+        }
         return check_writable(path);
     };
     Err(write_error(path, problem.into()))

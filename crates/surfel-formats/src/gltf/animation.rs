@@ -7,9 +7,9 @@ use surfel_core::words::counted;
 use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
 use super::hierarchy::Hierarchy;
-use super::json::{Json, shorten};
+use super::json::Json;
 use super::transform::unit_quaternion;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shorten};
 
 /// Reads the animation called `requested`, or the first one with a note that lists the others.
 pub(super) fn read<'a>(

@@ -3,8 +3,8 @@
 use serde_json::Value;
 use surfel_core::words::counted;
 
-use super::json::{Json, shorten};
-use crate::error::{Error, Location, Result};
+use super::json::Json;
+use crate::error::{Error, Location, Result, shorten};
 use crate::file::Input;
 
 /// First bytes of a GLB file.

@@ -1,14 +1,19 @@
 //! State shared by all parts of the reader: the JSON, the buffers, a memory budget and collected warnings.
 
 use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::path::PathBuf;
+use std::rc::Rc;
+
 use surfel_core::words::counted;
 
 use surfel_core::progress::Progress;
 
 use super::json::Json;
-use super::uri::{BufferData, load_uri};
+use super::uri::{BufferData, file_path, is_data_uri, open_file, read_data_uri};
 use crate::error::{Error, Result};
-use crate::file::ResourceResolver;
+use crate::file::{Input, ResourceResolver, file_key};
 
 /// Decoded bytes allowed for a file of any size: accessors without a buffer are zeros and take no space in
 /// the file.
@@ -42,6 +47,13 @@ pub(super) struct Buffer<'a> {
     n_bytes: usize,
 }
 
+/// The buffers of a file.
+pub(super) struct Buffers<'a> {
+    all: Vec<Buffer<'a>>,
+    /// Bytes of `data:` URIs and of external files, each file once.
+    n_external_bytes: usize,
+}
+
 /// A range of a buffer.
 #[derive(Clone, Copy)]
 pub(super) struct BufferView<'a> {
@@ -56,12 +68,29 @@ pub(super) fn load_buffers<'a>(
     root: &Json<'a>,
     bin_chunk: Option<&'a [u8]>,
     resolver: &ResourceResolver,
-) -> Result<Vec<Buffer<'a>>> {
-    let mut buffers = Vec::new();
+) -> Result<Buffers<'a>> {
+    let mut files: HashMap<PathBuf, Rc<Input>> = HashMap::new();
+    let mut buffers = Buffers { all: Vec::new(), n_external_bytes: 0 };
     for (i, buffer) in root.array_or_empty("buffers")?.into_iter().enumerate() {
         let length = buffer.require("byteLength")?;
         let data = match buffer.get("uri") {
-            Some(uri) => Some(load_uri(resolver, &uri)?),
+            Some(uri) if is_data_uri(uri.string()?) => {
+                let bytes = read_data_uri(&uri)?;
+                buffers.n_external_bytes += bytes.len();
+                Some(BufferData::DataUri(bytes))
+            }
+            Some(uri) => {
+                let path = file_path(resolver, &uri)?;
+                let file = match files.entry(file_key(&path)) {
+                    Entry::Occupied(known) => known.get().clone(),
+                    Entry::Vacant(vacant) => {
+                        let file = open_file(&path, &uri)?;
+                        buffers.n_external_bytes += file.len();
+                        vacant.insert(Rc::new(file)).clone()
+                    }
+                };
+                Some(BufferData::File(file))
+            }
             None if i == 0 => bin_chunk.map(BufferData::BinChunk),
             None => None,
         };
@@ -72,7 +101,7 @@ pub(super) fn load_buffers<'a>(
             let found = format!("{n_bytes}, but the buffer has {}", counted(data.len(), "byte"));
             return Err(length.error(found, "no more bytes than there are"));
         }
-        buffers.push(Buffer { data, n_bytes });
+        buffers.all.push(Buffer { data, n_bytes });
     }
     Ok(buffers)
 }
@@ -81,22 +110,18 @@ impl<'a> Document<'a> {
     /// Wraps a file of `n_bytes` and its buffers.
     pub fn new(
         root: Json<'a>,
-        buffers: &'a [Buffer<'a>],
+        buffers: &'a Buffers<'a>,
         n_bytes: usize,
         resolver: &'a ResourceResolver<'a>,
         progress: &'a dyn Progress,
     ) -> Self {
         // The buffer of a GLB is already counted as a part of the file.
-        let external = buffers.iter().filter_map(|buffer| match &buffer.data {
-            Some(BufferData::File(_) | BufferData::DataUri(_)) => buffer.data.as_deref(),
-            _ => None,
-        });
-        let n_bytes = (n_bytes + external.map(<[u8]>::len).sum::<usize>()) as u64;
+        let n_bytes = (n_bytes + buffers.n_external_bytes) as u64;
         Self {
             root,
             resolver,
             progress,
-            buffers,
+            buffers: &buffers.all,
             memory_budget: Cell::new(BASE_BYTES + BYTES_PER_BYTE.saturating_mul(n_bytes)),
             image_budget: Cell::new(n_bytes),
             warnings: RefCell::default(),

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::accessor::Accessor;
 use super::document::Document;
-use super::json::{Json, shorten};
-use crate::error::{Error, Result};
+use super::json::Json;
+use crate::error::{Error, Result, shorten};
 
 /// Extensions that are read.
 const SUPPORTED: [&str; 10] = [

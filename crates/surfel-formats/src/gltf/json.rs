@@ -3,7 +3,7 @@
 use serde_json::Value;
 use surfel_core::words::counted;
 
-use crate::error::{Error, Location, Result};
+use crate::error::{Error, Location, Result, shorten};
 
 pub(super) const ADVICE: &str = "export the file again; a glTF validator lists its errors";
 
@@ -200,14 +200,5 @@ fn describe(value: &Value) -> String {
         Value::Object(_) => "an object".into(),
         Value::String(text) => format!("`{}`", shorten(text)),
         other => other.to_string(),
-    }
-}
-
-/// Truncates a text that may be megabytes long.
-pub(super) fn shorten(text: &str) -> String {
-    const MAX_CHARS: usize = 60;
-    match text.char_indices().nth(MAX_CHARS) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.into(),
     }
 }

@@ -10,10 +10,10 @@ use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
 use super::hierarchy::{Entry, Hierarchy, ROOT};
 use super::instancing;
-use super::json::{Json, shorten};
+use super::json::Json;
 use super::mesh::MeshCache;
 use super::transform;
-use crate::error::Result;
+use crate::error::{Result, shorten};
 
 /// Reads the nodes of the scene below a root called `name`, which rotates +Y to +Z.
 pub(super) fn read_all<'a>(

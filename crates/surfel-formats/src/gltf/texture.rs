@@ -1,14 +1,16 @@
 //! Textures of materials. Each image is decoded once.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use surfel_core::math::Vec2;
 use surfel_core::scene::{Texture, TextureRef, Wrap};
 
 use super::document::Document;
 use super::json::Json;
-use super::uri::{is_data_uri, load_uri};
+use super::uri::{file_path, is_data_uri, open_file, read_data_uri};
 use crate::error::{Error, Result};
+use crate::file::file_key;
 use crate::mesh::decode_texture;
 
 /// The textures that materials have referred to so far.
@@ -18,12 +20,15 @@ pub(super) struct TextureCache<'a> {
     pub all: Vec<Texture>,
     /// Index of the texture by the URI or buffer view of its image; `None` if it cannot be decoded.
     by_source: HashMap<String, Option<usize>>,
+    /// Index of the texture of each file, which several URIs may name.
+    by_file: HashMap<PathBuf, Option<usize>>,
 }
 
 impl<'a> TextureCache<'a> {
     /// Creates a reader of the document's textures.
     pub fn new(document: &'a Document<'a>) -> Self {
-        Self { document, all: Vec::new(), by_source: HashMap::new() }
+        let (by_source, by_file) = (HashMap::new(), HashMap::new());
+        Self { document, all: Vec::new(), by_source, by_file }
     }
 
     /// Returns the texture in the member `key` of a material. An image that is missing or malformed is
@@ -78,10 +83,7 @@ impl<'a> TextureCache<'a> {
         }
         self.document.progress.check()?;
         let index = match self.decode(image) {
-            Ok(texture) => {
-                self.all.push(texture);
-                Some(self.all.len() - 1)
-            }
+            Ok(index) => index,
             Err(ImageError::Skipped(error)) => {
                 let line = format!("{} is skipped: {error}", image.pointer());
                 self.document.warn(line);
@@ -93,20 +95,35 @@ impl<'a> TextureCache<'a> {
         Ok(index)
     }
 
-    fn decode(&self, image: &Json<'a>) -> std::result::Result<Texture, ImageError> {
+    /// Decodes an image and returns the index of the texture; `None` if it is in a file that was skipped already.
+    fn decode(&mut self, image: &Json<'a>) -> Result<Option<usize>, ImageError> {
+        let name = format!("{}{}", image.file(), image.pointer());
         let Some(uri) = image.get("uri") else {
             let view = image.require("bufferView").map_err(ImageError::Fatal)?;
             let bytes = self.document.view(&view).map_err(ImageError::Fatal)?.bytes;
             self.document.reserve_image(image, bytes.len()).map_err(ImageError::Fatal)?;
-            let name = format!("{}{}", image.file(), image.pointer());
-            return decode_texture(&name, bytes).map_err(ImageError::Skipped);
+            return self.add(decode_texture(&name, bytes)).map(Some);
         };
-        let bytes = load_uri(self.document.resolver, &uri).map_err(ImageError::Skipped)?;
-        let name = match uri.string().map_err(ImageError::Fatal)? {
-            data if is_data_uri(data) => format!("{}{}", image.file(), image.pointer()),
-            path => path.into(),
-        };
-        decode_texture(&name, &bytes).map_err(ImageError::Skipped)
+        let text = uri.string().map_err(ImageError::Fatal)?;
+        if is_data_uri(text) {
+            let bytes = read_data_uri(&uri).map_err(ImageError::Skipped)?;
+            return self.add(decode_texture(&name, &bytes)).map(Some);
+        }
+        let path = file_path(self.document.resolver, &uri).map_err(ImageError::Skipped)?;
+        let key = file_key(&path);
+        if let Some(known) = self.by_file.get(&key) {
+            return Ok(*known);
+        }
+        let file = open_file(&path, &uri);
+        let decoded = self.add(file.and_then(|file| decode_texture(text, &file)));
+        self.by_file.insert(key, decoded.as_ref().ok().copied());
+        decoded.map(Some)
+    }
+
+    /// Adds a decoded texture and returns its index.
+    fn add(&mut self, decoded: Result<Texture>) -> Result<usize, ImageError> {
+        self.all.push(decoded.map_err(ImageError::Skipped)?);
+        Ok(self.all.len() - 1)
     }
 }
 

@@ -1,16 +1,17 @@
 //! URIs of buffers and images: external files and `data:` URIs.
 
 use std::ops::Deref;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
-use super::json::{Json, shorten};
-use crate::error::{Error, Result};
+use super::json::Json;
+use crate::error::{Error, Result, shorten};
 use crate::file::{Input, ResourceResolver};
 
 /// Bytes of a buffer or image and their storage.
 pub(super) enum BufferData<'a> {
-    /// An external file.
-    File(Input<'static>),
+    /// An external file, which several buffers may name.
+    File(Rc<Input<'static>>),
     /// Bytes decoded from a `data:` URI.
     DataUri(Vec<u8>),
     /// The buffer inside a GLB.
@@ -34,20 +35,20 @@ pub(super) fn is_data_uri(uri: &str) -> bool {
     strip_prefix_ignoring_case(uri, "data:").is_some()
 }
 
-/// Loads the bytes that the URI `reference` refers to: a `data:` URI or a file relative to the glTF file.
+/// Returns the bytes of the `data:` URI `reference`.
+pub(super) fn read_data_uri(reference: &Json) -> Result<Vec<u8>> {
+    let uri = reference.string()?;
+    strip_prefix_ignoring_case(uri, "data:").and_then(decode_data_uri).ok_or_else(|| {
+        reference.error(format!("`{}`", shorten(uri)), "`data:` and bytes in Base64")
+    })
+}
+
+/// Returns the path of the file that the URI `reference` refers to, relative to the glTF file.
 ///
 /// Relative paths may contain `..`. Absolute paths and network addresses are rejected, because they would
 /// make the image depend on the machine.
-pub(super) fn load_uri<'a>(
-    resolver: &ResourceResolver,
-    reference: &Json<'a>,
-) -> Result<BufferData<'a>> {
+pub(super) fn file_path(resolver: &ResourceResolver, reference: &Json) -> Result<PathBuf> {
     let uri = reference.string()?;
-    if let Some(data) = strip_prefix_ignoring_case(uri, "data:") {
-        return decode_data_uri(data).map(BufferData::DataUri).ok_or_else(|| {
-            reference.error(format!("`{}`", shorten(uri)), "`data:` and bytes in Base64")
-        });
-    }
     let unsupported = |advice| Error::Unsupported {
         file: reference.file().into(),
         action: "read",
@@ -63,7 +64,13 @@ pub(super) fn load_uri<'a>(
         return Err(unsupported("copy the file into the folder and write its relative path"));
     }
     let paths = candidate_paths(uri).map(|path| folder.join(path));
-    Input::open(resolver.choose(&paths)).map(BufferData::File).map_err(|error| match error {
+    Ok(resolver.choose(&paths).to_owned())
+}
+
+/// Opens the file at `path`, which the URI `reference` refers to.
+pub(super) fn open_file(path: &Path, reference: &Json) -> Result<Input<'static>> {
+    let uri = reference.string()?;
+    Input::open(path).map_err(|error| match error {
         Error::Io { file, cause, .. } => {
             let found = format!("`{}`, and {file} cannot be read ({cause})", shorten(uri));
             reference.error(found, "a file beside this one, copied along with it")
@@ -72,13 +79,16 @@ pub(super) fn load_uri<'a>(
     })
 }
 
-/// Returns true if a URI begins with a scheme (`https:`), a drive (`C:`) or the root.
+/// Returns true if a URI begins with a scheme (`https:`), a drive (`C:`) or the root, the latter two also in escapes.
 fn is_absolute(uri: &str) -> bool {
+    let decoded = decode_percent(uri);
+    // The escapes of a scheme make it a part of a name, as in `a%3Ab.png`.
+    let is_drive = matches!(*decoded, [letter, b':', ..] if letter.is_ascii_alphabetic());
     let scheme = uri.split(['/', '\\', '?', '#']).next().unwrap_or_default();
     let scheme = scheme.split_once(':').map_or("", |(scheme, _)| scheme);
     let is_scheme = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
-    is_scheme || uri.starts_with(['/', '\\']) || decode_percent(uri).starts_with(b"/")
+    is_scheme || is_drive || matches!(decoded.first(), Some(b'/' | b'\\'))
 }
 
 /// Returns the paths that a URI may mean, most likely first: percent-decoded as the standard requires,
@@ -177,10 +187,30 @@ mod tests {
 
     #[test]
     fn absolute_uris_are_distinguished_from_relative_ones() {
-        for uri in ["/a", "\\\\server\\a", "C:\\a.bin", "http://a/b", "file:a", "%2Fetc/a"] {
+        for uri in [
+            "/a",
+            "\\\\server\\a",
+            "C:\\a.bin",
+            "http://a/b",
+            "file:a",
+            "%2Fetc/a",
+            "C%3A/secrets/a.png",
+            "%43%3a%5Ca.png",
+            "%5C%5Cserver%5Cshare%5Ca.png",
+            "%5Ca",
+        ] {
             assert!(is_absolute(uri), "{uri}");
         }
-        for uri in ["a.bin", "../a.bin", "a/b:c.bin", "ö:a", "a b.png", "1:2.png"] {
+        for uri in [
+            "a.bin",
+            "../a.bin",
+            "a/b:c.bin",
+            "ö:a",
+            "a b.png",
+            "1:2.png",
+            "ab%3Ac.png",
+            "a%5Cb.png",
+        ] {
             assert!(!is_absolute(uri), "{uri}");
         }
     }

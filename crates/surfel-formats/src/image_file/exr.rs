@@ -10,6 +10,7 @@ use exr::prelude::{
 use surfel_core::image::Image;
 use surfel_core::math::Vec3;
 
+use super::limits::encoder_error;
 use super::options::ImageOptions;
 use crate::error::Result;
 use crate::file::{write_error, write_file};
@@ -27,14 +28,9 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
     let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels);
     let exr_image = ExrImage::from_layer(layer);
     write_file(path, |writer| {
-        exr_image.write().to_buffered(writer).map_err(|error| {
-            write_error(
-                path,
-                match error {
-                    exr::error::Error::Io(source) => source,
-                    other => std::io::Error::other(other.to_string()),
-                },
-            )
+        exr_image.write().to_buffered(writer).map_err(|error| match error {
+            exr::error::Error::Io(cause) => write_error(path, cause),
+            refusal => encoder_error(path, refusal),
         })
     })
 }

@@ -1,7 +1,7 @@
 //! Writes JPEG and WebP: pictures to be looked at, by the encoders of the crate `image`.
 
 use std::borrow::Cow;
-use std::io::{self, Cursor};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
 use image::codecs::jpeg::{JpegEncoder, PixelDensity};
@@ -9,6 +9,7 @@ use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 use surfel_core::image::Image;
 
+use super::limits::encoder_error;
 use super::options::{Alpha, BitDepth, ImageOptions};
 use super::png::samples;
 use crate::error::Result;
@@ -44,13 +45,12 @@ pub(super) fn write(
     options: &ImageOptions,
     format: DisplayFormat,
 ) -> Result<()> {
-    let encoded = encode(image, options, format).map_err(io::Error::other);
-    let bytes = encoded.map_err(|source| write_error(path, source))?;
-    write_file(path, |writer| {
-        io::Write::write_all(writer, &bytes).map_err(|source| write_error(path, source))
-    })
+    let encoded = encode(image, options, format);
+    let bytes = encoded.map_err(|refusal| encoder_error(path, refusal))?;
+    write_file(path, |writer| writer.write_all(&bytes).map_err(|cause| write_error(path, cause)))
 }
 
+/// Returns the bytes of the file. No disk is used, so that each error is the encoder's.
 fn encode(image: &Image, options: &ImageOptions, format: DisplayFormat) -> ImageResult<Vec<u8>> {
     let (image, alpha) = match (format, options.alpha) {
         (DisplayFormat::Jpeg, Alpha::Keep) => (Cow::Owned(over_white(image)), Alpha::Drop),

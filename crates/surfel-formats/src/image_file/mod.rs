@@ -2,15 +2,19 @@
 
 mod georeference;
 mod options;
+mod limits;
 mod exr;
 pub(crate) mod png;
 mod jpeg_webp;
 mod tiff;
 
 pub use self::georeference::{EpsgCodes, Georeference};
+pub use self::limits::check_image_size;
 pub use self::options::{Alpha, BitDepth, ImageOptions};
 pub use self::png::encode_png;
 pub use self::tiff::{HeightMap, check_height_map, save_height_map};
+
+pub(crate) use self::limits::encoder_error;
 
 use std::path::Path;
 
@@ -47,9 +51,10 @@ pub fn check_image_output(path: &Path) -> Result<()> {
 ///
 /// # Errors
 ///
-/// Fails if the extension is unknown or if the file cannot be written.
+/// Fails if the extension is unknown, if the format holds no picture of this size, or if the file cannot be written.
 pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<()> {
     check_image_output(path)?;
+    check_image_size(path, image.width, image.height)?;
     let extension = extension(path);
     if let Some(format) = DisplayFormat::from_extension(&extension) {
         jpeg_webp::write(path, image, options, format)?;

@@ -4,16 +4,18 @@ use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::Path;
 
+use png::EncodingError;
 use surfel_core::image::{Image, encode_srgb, encode_srgb8, encode_srgba8, unpremultiply};
 
+use super::limits::encoder_error;
 use super::options::{Alpha, BitDepth, ImageOptions};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::file::{write_error, write_file};
 
 /// Writes a PNG.
 pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Result<()> {
     write_file(path, |writer| {
-        encode(writer, image, options).map_err(|source| write_error(path, source))
+        encode(writer, image, options).map_err(|error| png_error(path, error))
     })
 }
 
@@ -25,7 +27,7 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
 pub fn encode_png(image: &Image, options: &ImageOptions) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     encode(&mut bytes, image, options)
-        .map_err(|source| write_error(Path::new("an image in memory"), source))?;
+        .map_err(|error| png_error(Path::new("an image in memory"), error))?;
     Ok(bytes)
 }
 
@@ -33,8 +35,16 @@ pub fn encode_png(image: &Image, options: &ImageOptions) -> Result<Vec<u8>> {
 pub(super) fn write_to_stdout(image: &Image, options: &ImageOptions) -> Result<()> {
     let mut out = io::BufWriter::new(io::stdout().lock());
     encode(&mut out, image, options)
-        .and_then(|()| out.flush())
-        .map_err(|source| write_error(Path::new("-"), source))
+        .and_then(|()| Ok(out.flush()?))
+        .map_err(|error| png_error(Path::new("-"), error))
+}
+
+/// Returns the error of a picture that could not be written to `path`.
+pub(crate) fn png_error(path: &Path, error: EncodingError) -> Error {
+    match error {
+        EncodingError::IoError(cause) => write_error(path, cause),
+        refusal => encoder_error(path, refusal),
+    }
 }
 
 /// Reads the samples of an image of this size that was written with the same options.
@@ -96,7 +106,7 @@ fn sample_type(options: &ImageOptions) -> (png::ColorType, png::BitDepth) {
     (color, depth)
 }
 
-fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Result<()> {
+fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> Result<(), EncodingError> {
     let mut writer = encoder(writer, (image.width, image.height), options).write_header()?;
     writer.write_image_data(&samples(image, options))?;
     writer.finish()?;

@@ -13,6 +13,7 @@ use tiff::encoder::{
 use tiff::tags::{ExtraSamples, ResolutionUnit, Tag};
 
 use super::georeference::Georeference;
+use super::limits::{check_image_size, encoder_error};
 use super::options::{Alpha, BitDepth, ImageOptions};
 use super::png::samples;
 use crate::error::Result;
@@ -52,9 +53,11 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
 ///
 /// # Errors
 ///
-/// Fails if the extension is neither .tif nor .tiff, and if the file cannot be written.
+/// Fails if the extension is neither .tif nor .tiff, if TIFF holds no map of this size, and if the file cannot be
+/// written.
 pub fn save_height_map(path: &Path, map: &HeightMap) -> Result<()> {
     check_height_map(path)?;
+    check_image_size(path, map.width, map.height)?;
     let options = ImageOptions {
         alpha: Alpha::Drop,
         georeference: Some(map.georeference),
@@ -90,12 +93,9 @@ where
     [C::Inner]: TiffValue,
 {
     write_file(path, |writer| {
-        encode::<C, _>(writer, size, samples, options, no_data).map_err(|error| {
-            let source = match error {
-                TiffError::IoError(source) => source,
-                other => std::io::Error::other(other),
-            };
-            write_error(path, source)
+        encode::<C, _>(writer, size, samples, options, no_data).map_err(|error| match error {
+            TiffError::IoError(cause) => write_error(path, cause),
+            refusal => encoder_error(path, refusal),
         })
     })
 }

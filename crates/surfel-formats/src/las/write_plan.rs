@@ -62,7 +62,7 @@ impl<'a> WritePlan<'a> {
             .into_iter()
             .map(|(name, values)| ExtraColumn::new(&name, values, cloud, &extra_fields))
             .collect();
-        let (fields, reasons) = choose_fields(cloud, &standard, source);
+        let (fields, reasons) = choose_fields(cloud, cloud.len() as u64, &standard, source);
         let minor_version =
             fields.minor_version(source.map_or(DEFAULT_MINOR_VERSION, |las| las.minor_version));
         let (scale, offset) = choose_steps(cloud, options);
@@ -236,9 +236,10 @@ fn assign_columns(
     (standard, extras)
 }
 
-/// Returns the fields of the point format, and what they have that the source does not.
+/// Returns the fields of the point format for this number of points, and what they have that the source does not.
 fn choose_fields(
     cloud: &PointCloud,
+    n_points: u64,
     standard: &StandardColumns,
     source: Option<&LasProfile>,
 ) -> (PointFields, Vec<&'static str>) {
@@ -266,6 +267,7 @@ fn choose_fields(
         let is_short = |v: f64| v <= 7.0;
         let returns = [standard.return_number, standard.number_of_returns];
         let limits = [
+            ("more than 4294967295 points", u64::from(u32::MAX) < n_points),
             ("more than 7 returns", returns.iter().any(|column| exceeds(*column, is_short))),
             ("classes above 31", cloud.classification.iter().flatten().any(|class| 31 < *class)),
             (
@@ -276,7 +278,7 @@ fn choose_fields(
             ("near infrared", fields.has_nir),
         ];
         fields.is_extended = limits.iter().any(|(_, is_exceeded)| *is_exceeded);
-        limits[..4].iter().for_each(|(reason, is_exceeded)| add(reason, *is_exceeded));
+        limits[..5].iter().for_each(|(reason, is_exceeded)| add(reason, *is_exceeded));
     }
     // Extended formats have times in any case.
     fields.has_gps_time |= fields.is_extended;
@@ -355,4 +357,26 @@ fn choose_scale(extent: DVec3, resolution: Option<DVec3>) -> DVec3 {
         step
     };
     DVec3::new(step(0), step(1), step(2))
+}
+
+#[cfg(test)]
+mod tests {
+    //! The point format of clouds that are too large for a test.
+
+    use super::*;
+
+    #[test]
+    fn more_points_than_legacy_formats_count_need_an_extended_one() {
+        let cloud = PointCloud::default();
+        let (standard, _) = assign_columns(&cloud, false);
+        let source = LasProfile { minor_version: 2, point_format: 0, ..LasProfile::default() };
+        let chosen = |n_points| choose_fields(&cloud, n_points, &standard, Some(&source));
+        assert_eq!(chosen(0xffff_ffff).0.format(), 0);
+        let (fields, reasons) = chosen(0x1_0000_0000);
+        assert_eq!((fields.format(), fields.minor_version(2)), (6, 4));
+        let line = describe_change(&source, 4, fields, &reasons).unwrap();
+        let expected = "written as LAS 1.4, point format 6, not as LAS 1.2, point format 0: \
+            more than 4294967295 points";
+        assert_eq!(line, expected);
+    }
 }

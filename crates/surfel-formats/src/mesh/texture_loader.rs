@@ -1,11 +1,12 @@
 //! Textures that a mesh file names, each read once.
 
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use surfel_core::scene::Texture;
 
 use super::texture::decode_texture;
-use crate::file::{MissingFiles, ResourceResolver};
+use crate::file::{Input, MissingFiles, ResourceResolver, file_key};
 
 /// Reads textures by the names of their files.
 pub(crate) struct TextureLoader<'a> {
@@ -15,6 +16,8 @@ pub(crate) struct TextureLoader<'a> {
     pub missing: MissingFiles,
     /// Index of the texture of each requested name, `None` if it cannot be read.
     by_name: HashMap<String, Option<usize>>,
+    /// Index of the texture of each file, which may have several names.
+    by_file: HashMap<PathBuf, Option<usize>>,
     resolver: &'a ResourceResolver<'a>,
 }
 
@@ -25,6 +28,7 @@ impl<'a> TextureLoader<'a> {
             textures: Vec::new(),
             missing: MissingFiles::default(),
             by_name: HashMap::new(),
+            by_file: HashMap::new(),
             resolver,
         }
     }
@@ -34,21 +38,35 @@ impl<'a> TextureLoader<'a> {
         if let Some(known) = self.by_name.get(name) {
             return *known;
         }
-        let decoded = self
-            .resolver
-            .open(name)
-            .and_then(|file| decode_texture(&file.name, &file).map_err(|error| error.to_string()));
-        let texture = match decoded {
-            Ok(texture) => {
-                self.textures.push(texture);
-                Some(self.textures.len() - 1)
-            }
+        let texture = match self.resolver.find(name) {
+            Ok(path) => self.load_file(&path),
             Err(reason) => {
                 self.missing.add(reason);
                 None
             }
         };
         self.by_name.insert(name.to_owned(), texture);
+        texture
+    }
+
+    /// Returns the index of the texture in a file, or `None` if it cannot be read.
+    fn load_file(&mut self, path: &Path) -> Option<usize> {
+        let key = file_key(path);
+        if let Some(known) = self.by_file.get(&key) {
+            return *known;
+        }
+        let decoded = Input::open(path).and_then(|file| decode_texture(&file.name, &file));
+        let texture = match decoded {
+            Ok(texture) => {
+                self.textures.push(texture);
+                Some(self.textures.len() - 1)
+            }
+            Err(error) => {
+                self.missing.add(error.to_string());
+                None
+            }
+        };
+        self.by_file.insert(key, texture);
         texture
     }
 }

@@ -3,7 +3,7 @@
 use surfel_core::progress::Progress;
 
 use crate::error::Result;
-use crate::file::{write_error, write_file};
+use crate::file::write_file;
 use crate::image_file::png;
 
 use super::spec::MovieSpec;
@@ -12,7 +12,7 @@ use super::spec::MovieSpec;
 pub(super) fn write(spec: &MovieSpec, progress: &dyn Progress) -> Result<()> {
     let n_frames = spec.options.n_frames;
     progress.begin(&format!("write {}", spec.file()), n_frames.into());
-    let failed = |error: ::png::EncodingError| write_error(&spec.path, error.into());
+    let failed = |error| png::png_error(&spec.path, error);
     write_file(&spec.path, |writer| {
         let mut encoder = png::encoder(writer, spec.size(), &spec.options.image);
         // 0 plays means an endless loop.

@@ -1,13 +1,12 @@
 //! Animated GIF writer with a palette of 256 colours per frame.
 
-use std::io;
-
 use gif::{Encoder, EncodingError, Frame, Repeat};
 use rayon::prelude::*;
 use surfel_core::progress::Progress;
 
 use crate::error::Result;
 use crate::file::{write_error, write_file};
+use crate::image_file::encoder_error;
 
 use super::spec::MovieSpec;
 
@@ -21,7 +20,7 @@ pub(super) fn write(spec: &MovieSpec, progress: &dyn Progress) -> Result<()> {
     progress.begin(&format!("write {}", spec.file()), n_frames.into());
     let failed = |error: EncodingError| match error {
         EncodingError::Io(cause) => write_error(&spec.path, cause),
-        other => write_error(&spec.path, io::Error::other(other.to_string())),
+        refusal => encoder_error(&spec.path, refusal),
     };
     write_file(&spec.path, |writer| {
         let (width, height) = size(spec);

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use surfel_core::render::MAX_PIXELS;
+
 use crate::error::{Error, Result};
 use crate::file::check_output_path;
-use crate::image_file::{Alpha, BitDepth, ImageOptions, png};
+use crate::image_file::{Alpha, BitDepth, ImageOptions, check_image_size, png};
 
 use super::format::MovieFormat;
 use super::frame_names::FrameNames;
@@ -40,10 +42,17 @@ impl MovieSpec {
         };
         let mut options = options.clone();
         let size = (options.width, options.height);
-        let max_side = if format == MovieFormat::Gif { u16::MAX.into() } else { u32::MAX >> 1 };
-        if size.0.min(size.1) == 0 || max_side < size.0.max(size.1) {
-            let advice = "choose a size of at least 1x1, for GIF of at most 65535x65535";
+        let n_pixels = u64::from(size.0) * u64::from(size.1);
+        if !(1..=MAX_PIXELS).contains(&n_pixels) {
+            let advice = "choose a size of at least 1x1, and of at most 2^28 pixels";
             return unsupported(format!("frames of {}x{} pixels", size.0, size.1), advice);
+        }
+        if format == MovieFormat::Gif && u32::from(u16::MAX) < size.0.max(size.1) {
+            let advice = "choose for GIF a size of at most 65535x65535";
+            return unsupported(format!("frames of {}x{} pixels", size.0, size.1), advice);
+        }
+        if format == MovieFormat::ImageSequence {
+            check_image_size(path, size.0, size.1)?;
         }
         if options.n_frames == 0 {
             return unsupported("a movie of no frames".into(), "choose at least one");

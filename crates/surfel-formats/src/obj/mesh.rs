@@ -12,7 +12,7 @@ use super::mtl::{self, Mtl};
 use super::parse::{Parsed, parse};
 use super::textures::material_with_textures;
 use crate::error::{Location, Result};
-use crate::file::{Input, MissingFiles, ResourceResolver};
+use crate::file::{Input, MissingFiles, ResourceResolver, file_key};
 use crate::mesh::{Model, TextureLoader, repair_model};
 use crate::options::{FileInfo, LoadOptions};
 use crate::table::{TextChunk, line_at};
@@ -92,8 +92,14 @@ fn read_libraries(
 ) -> HashMap<String, Mtl> {
     let mut materials = HashMap::new();
     let mut missing = MissingFiles::default();
+    let mut files = HashSet::new();
     let mut read = |name: &str| {
-        let library = resolver.open(name)?;
+        let path = resolver.find(name)?;
+        let library = Input::open(&path).map_err(|error| error.to_string())?;
+        // A library that has several names is read once.
+        if !files.insert(file_key(&path)) {
+            return Ok(());
+        }
         let (read, fault) = mtl::parse(&library);
         if let Some(fault) = fault {
             progress.note(&format!("{}; left out", fault.into_error(&library)));

@@ -1,6 +1,6 @@
 //! The header of a PCD file: the fields of a point and the number of points.
 
-use crate::error::{Location, Result};
+use crate::error::{Location, Result, shorten};
 use crate::file::Input;
 use crate::table::{MAX_FIELDS, NumberType};
 use surfel_core::math::{DQuat, DVec3};
@@ -298,8 +298,4 @@ fn number_type(letter: char, size: usize) -> Option<NumberType> {
         ('F', 8) => NumberType::F64,
         _ => return None,
     })
-}
-
-fn shorten(text: &str) -> String {
-    text.chars().take(60).collect()
 }

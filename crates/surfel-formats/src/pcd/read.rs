@@ -178,7 +178,8 @@ fn read_binary(
     };
     let fields = columns.iter().map(|(name, field)| (name.as_str(), *field));
     let sample = &records[..records.len().min(1 << 20)];
-    let columns = named_columns(fields, stride, false, sample, &records, &options.columns);
+    let columns =
+        named_columns(fields, stride, false, sample, &records, &options.columns, progress);
     let layout = layout(stride, columns, options);
     let tolerance = match layout.position[0].number_type {
         NumberType::F64 => Tolerance::UNSTATED,
@@ -243,7 +244,8 @@ fn read_ascii(
             .iter()
             .enumerate()
             .map(|(i, (name, field))| (name.as_str(), Field::parsed(8 * i, field.file_type)));
-        let columns = named_columns(fields, stride, false, sample, sample, &options.columns);
+        let columns =
+            named_columns(fields, stride, false, sample, sample, &options.columns, progress);
         layout(stride, columns, options)
     };
     progress.begin(&format!("read {}", input.name), (input.len() - header.body) as u64);

@@ -63,7 +63,11 @@ pub(super) fn read_faces(
     progress: &dyn Progress,
 ) -> Result<Faces> {
     let input = salvage.input;
-    progress.begin(&format!("read the faces of {}", input.name), count_faces(header));
+    // Lines of text are parsed in chunks of many bytes, binary faces one by one.
+    let is_ascii = header.encoding == Encoding::Ascii;
+    let n_bytes = (input.len() - header.body) as u64;
+    let n_units = if is_ascii { n_bytes } else { count_faces(header) };
+    progress.begin(&format!("read the faces of {}", input.name), n_units);
     let mut faces = Faces::default();
     let mut at = header.body;
     for element in &header.elements {
@@ -91,7 +95,11 @@ fn skip(
     progress: &dyn Progress,
 ) -> Result<usize> {
     match encoding {
-        Encoding::Ascii => end_of_lines(input, start, element, progress),
+        Encoding::Ascii => {
+            let end = end_of_lines(input, start, element, progress)?;
+            progress.advance((end - start) as u64);
+            Ok(end)
+        }
         _ => skip_elements(input, start, element, encoding == Encoding::BigEndian, progress),
     }
 }

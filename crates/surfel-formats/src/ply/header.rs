@@ -1,5 +1,7 @@
 //! The header of a PLY file: elements and their properties.
 
+use std::borrow::Cow;
+
 use super::station_comment::parse_station;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
@@ -81,10 +83,7 @@ impl Element {
 /// Reads the header at the start of `input`.
 pub(super) fn read_header(input: &Input) -> Result<Header> {
     let mut lines = Lines::new(input);
-    let mut encoding = None;
-    let mut textures = Vec::new();
-    let mut stations = Vec::new();
-    let mut elements: Vec<Element> = Vec::new();
+    let mut declarations = Declarations::default();
     loop {
         let number = lines.number;
         let malformed = |found: &str, expected: &str| {
@@ -100,56 +99,66 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        match words.as_slice() {
+        if words != ["end_header"] {
+            declarations.add(&line, &words).map_err(|expected| malformed(&line, &expected))?;
+            continue;
+        }
+        let Declarations { encoding, elements, textures, stations } = declarations;
+        let Some(encoding) = encoding else {
+            return Err(malformed(&line, "a `format` line before it"));
+        };
+        let (body, body_line) = (lines.at, lines.number);
+        return Ok(Header { encoding, elements, textures, stations, body, body_line });
+    }
+}
+
+/// The content of the lines that were read so far.
+#[derive(Default)]
+struct Declarations {
+    encoding: Option<Encoding>,
+    elements: Vec<Element>,
+    textures: Vec<String>,
+    stations: Vec<ScanStation>,
+}
+
+impl Declarations {
+    /// Adds a line, which consists of `words`; fails with what was expected.
+    fn add(&mut self, line: &str, words: &[&str]) -> Result<(), Cow<'static, str>> {
+        match words {
             ["comment", "TextureFile", ..] => {
                 let name = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
-                textures.extend(name);
+                self.textures.extend(name);
             }
-            ["comment", "station", ..] if stations.len() < MAX_STATIONS => {
-                stations.extend(parse_station(&words));
+            ["comment", "station", ..] if self.stations.len() < MAX_STATIONS => {
+                self.stations.extend(parse_station(words));
             }
             ["ply"] | ["comment" | "obj_info", ..] | [] => {}
             ["format", name, _version] => {
                 let expected = "ascii, binary_little_endian or binary_big_endian";
-                let found = parse_encoding(name).ok_or_else(|| malformed(&line, expected))?;
-                encoding = Some(found);
+                self.encoding = Some(parse_encoding(name).ok_or(expected)?);
             }
             ["element", name, count] => {
-                let Ok(count) = count.parse() else {
-                    return Err(malformed(&line, "`element NAME COUNT`"));
-                };
-                elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
+                let count = count.parse().map_err(|_| "`element NAME COUNT`")?;
+                let element = Element { name: (*name).into(), count, properties: Vec::new() };
+                self.elements.push(element);
             }
-            ["property", _, .., _] => {
-                let Some(property) = parse_property(&words) else {
-                    return Err(malformed(
-                        &line,
-                        "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar",
-                    ));
-                };
-                let Some(element) = elements.last_mut() else {
-                    return Err(malformed(&line, "an element before its properties"));
-                };
-                if element.properties.len() == MAX_FIELDS {
-                    let expected = format!("at most {MAX_FIELDS} properties an element");
-                    return Err(malformed(&line, &expected));
-                }
-                element.properties.push(property);
-            }
-            ["end_header"] => {
-                let Some(encoding) = encoding else {
-                    return Err(malformed(&line, "a `format` line before it"));
-                };
-                let (body, body_line) = (lines.at, lines.number);
-                return Ok(Header { encoding, elements, textures, stations, body, body_line });
-            }
-            _ => {
-                return Err(malformed(
-                    &line,
-                    "format, element, property, comment, obj_info or end_header",
-                ));
-            }
+            ["property", _, .., _] => self.add_property(words)?,
+            _ => return Err("format, element, property, comment, obj_info or end_header".into()),
         }
+        Ok(())
+    }
+
+    /// Adds a property to the last element; fails with what was expected.
+    fn add_property(&mut self, words: &[&str]) -> Result<(), Cow<'static, str>> {
+        let property = parse_property(words).ok_or(
+            "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar",
+        )?;
+        let element = self.elements.last_mut().ok_or("an element before its properties")?;
+        if element.properties.len() == MAX_FIELDS {
+            return Err(format!("at most {MAX_FIELDS} properties an element").into());
+        }
+        element.properties.push(property);
+        Ok(())
     }
 }
 

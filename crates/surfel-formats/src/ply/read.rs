@@ -162,7 +162,7 @@ fn read_binary(
         packed = pack_vertices(salvage, start, vertex, big_endian, progress)?;
         &packed
     };
-    let layout = layout(stride, big_endian, columns, records, options);
+    let layout = layout(stride, big_endian, columns, records, options, progress);
     let tolerance = match layout.position[0].number_type {
         NumberType::F64 => Tolerance::UNSTATED,
         _ => Tolerance::F32_COORDINATES,
@@ -208,7 +208,8 @@ fn read_ascii(
         let fields = columns.iter().enumerate();
         let fields =
             fields.map(|(i, (name, number_type))| (*name, Field::parsed(8 * i, *number_type)));
-        let columns = named_columns(fields, 8 * n_columns, false, sample, sample, &options.columns);
+        let columns =
+            named_columns(fields, 8 * n_columns, false, sample, sample, &options.columns, progress);
         RecordLayout::new(8 * n_columns, false, columns, &options.columns)
             .expect("x, y and z were found")
     };
@@ -251,8 +252,10 @@ fn layout(
     columns: Vec<(&str, Field)>,
     records: &[u8],
     options: &LoadOptions,
+    progress: &dyn Progress,
 ) -> RecordLayout {
     let (columns, sample) = (columns.into_iter(), &records[..records.len().min(1 << 20)]);
-    let columns = named_columns(columns, stride, big_endian, sample, records, &options.columns);
+    let columns =
+        named_columns(columns, stride, big_endian, sample, records, &options.columns, progress);
     RecordLayout::new(stride, big_endian, columns, &options.columns).expect("x, y and z were found")
 }

@@ -3,7 +3,7 @@
 use surfel_core::points::KnownColumn;
 
 /// The meaning of a column.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum ColumnRole {
     /// Coordinate on an axis; 0, 1, 2 are x, y, z.
     Position(usize),

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Scalar, Values};
+use surfel_core::progress::{NoProgress, Progress};
 
 use super::color_range::is_byte;
 use super::column_choice::ColumnChoice;
@@ -116,17 +117,19 @@ impl Field {
         matches!(self.empty_values(), Values::F32(_) | Values::F64(_))
     }
 
-    /// Returns true if all values in `records` can be classes or are missing.
-    pub fn holds_classes(&self, records: &[u8], stride: usize, big_endian: bool) -> bool {
-        const RECORDS_PER_TASK: usize = 1 << 14;
-        let is_class = |record| {
+    /// Returns true if all values in `records` can be classes or are missing; false once the work is cancelled.
+    pub fn holds_classes(
+        &self,
+        records: &[u8],
+        stride: usize,
+        big_endian: bool,
+        progress: &dyn Progress,
+    ) -> bool {
+        let is_class = |record: &[u8]| {
             let value = self.value(record, big_endian);
             is_byte(value) || value.is_nan()
         };
-        self.file_type == NumberType::U8
-            || records
-                .par_chunks(RECORDS_PER_TASK * stride)
-                .all(|records| records.chunks_exact(stride).all(is_class))
+        self.file_type == NumberType::U8 || all_records(records, stride, is_class, progress)
     }
 
     /// Calls `set` with each element of `out` and the field's value in the record of the same index.
@@ -260,7 +263,11 @@ impl RecordLayout {
     /// records has a value that is no class.
     pub fn demote_classes(&mut self, batch: &[Vec<u8>], cloud: &mut PointCloud) {
         let Some(field) = self.classification else { return };
-        if batch.iter().all(|records| field.holds_classes(records, self.stride, self.big_endian)) {
+        let (stride, big_endian) = (self.stride, self.big_endian);
+        // A batch is small enough to be looked through to its end.
+        let holds_classes =
+            |records: &Vec<u8>| field.holds_classes(records, stride, big_endian, &NoProgress);
+        if batch.iter().all(holds_classes) {
             return;
         }
         self.classification = None;
@@ -324,6 +331,19 @@ impl RecordLayout {
     fn fill<T>(&self, field: &Field, records: &[u8], out: &mut [T], set: impl Fn(&mut T, f64)) {
         field.fill(records, self.stride, self.big_endian, out, set);
     }
+}
+
+/// Returns true if `holds` is true for all records, which threads look through; false once the work is cancelled.
+pub(super) fn all_records(
+    records: &[u8],
+    stride: usize,
+    holds: impl Fn(&[u8]) -> bool + Sync,
+    progress: &dyn Progress,
+) -> bool {
+    const RECORDS_PER_TASK: usize = 1 << 14;
+    records
+        .par_chunks(RECORDS_PER_TASK * stride)
+        .all(|records| !progress.is_cancelled() && records.chunks_exact(stride).all(&holds))
 }
 
 /// Returns a normal that has unit length but for rounding at unit length. Other lengths may be radii.

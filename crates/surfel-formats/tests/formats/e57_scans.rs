@@ -4,7 +4,9 @@ use e57::{E57Reader, Record, RecordDataType, RecordName, RecordValue};
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{STATION, Values};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{Column, ColumnChoice, Error, LoadOptions, inspect, load, load_bytes};
+use surfel_formats::{
+    Column, ColumnChoice, Error, LoadOptions, inspect, inspect_bytes, load, load_bytes,
+};
 
 use crate::common::{Folder, Listener, read, shared};
 use crate::e57_writer::{Scan, replace, small_file, with_checksums, write};
@@ -403,4 +405,28 @@ fn the_many_columns_of_a_small_scan_are_not_those_of_a_large_one() {
     let options = LoadOptions { columns: ColumnChoice::Only(Vec::new()), ..LoadOptions::default() };
     let cloud = load_bytes("a.e57", &file, &options, &NoProgress).unwrap().cloud;
     assert_eq!(cloud.len(), 80_001);
+}
+
+#[test]
+fn files_of_more_columns_than_a_scan_may_have_are_refused() {
+    let scan = |name, fields: std::ops::Range<usize>| {
+        let field = |i: usize| {
+            let name = RecordName::Unknown { namespace: "nor".into(), name: format!("a{i}") };
+            record(name, RecordDataType::Integer { min: 0, max: 1 })
+        };
+        let n_fields = fields.len();
+        let prototype = [prototype([]), fields.map(field).collect()].concat();
+        let position = vec![RecordValue::Double(1.0); 3];
+        let points = vec![[position, vec![RecordValue::Integer(1); n_fields]].concat()];
+        Scan { name, pose: None, prototype, points }
+    };
+    let same = write(&[scan("hall", 0..600), scan("yard", 0..600)]);
+    assert_eq!(read("a.e57", &same).unwrap().cloud.scalars.len(), 601);
+    let different = write(&[scan("hall", 0..600), scan("yard", 600..1200)]);
+    let inspected = inspect_bytes("a.e57", &different).unwrap_err();
+    for error in [inspected, read("a.e57", &different).map(|_| ()).unwrap_err()] {
+        let message = error.to_string();
+        let expected = "found more than 1000 different columns in all scans, expected at most 1000";
+        assert!(message.contains(expected), "{message}");
+    }
 }

@@ -1,9 +1,10 @@
 //! Truncated, changed and incomplete glTF files: each is an error or gives a valid graph.
 
 use serde_json::{Value, json};
+use surfel_core::image::Image;
 use surfel_core::math::Random;
 use surfel_core::progress::NoProgress;
-use surfel_formats::{load_gltf, load_gltf_bytes};
+use surfel_formats::{ImageOptions, encode_png, load_gltf, load_gltf_bytes};
 
 use crate::common::{Folder, Listener};
 use crate::gltf_asset::{full_asset, load_bytes, set, triangle};
@@ -138,6 +139,56 @@ fn replacing_any_json_value_does_not_panic() {
             let _ = load_bytes("a.glb", &broken.glb());
         }
     }
+}
+
+#[test]
+fn a_buffer_with_many_names_allows_no_more_memory_than_once() {
+    let folder = Folder::new("gltf-names");
+    std::fs::write(folder.path("a.bin"), vec![0; 1 << 20]).unwrap();
+    let load = |n_buffers: usize| {
+        let name = |i: usize| format!("{}a.bin", "./".repeat(i));
+        let buffers: Vec<Value> =
+            (0..n_buffers).map(|i| json!({"uri": name(i), "byteLength": 1 << 20})).collect();
+        // 240 MiB of zeros: more than the 64 MiB of any file and 64 bytes for each of the buffer's.
+        let accessor = json!({"componentType": 5126, "type": "VEC3", "count": 20 << 20});
+        let gltf = json!({
+            "asset": {"version": "2.0"}, "buffers": buffers, "accessors": [accessor],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}],
+            "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        });
+        std::fs::write(folder.path("a.gltf"), gltf.to_string()).unwrap();
+        load_gltf(&folder.path("a.gltf"), &NoProgress).map(|_| ())
+    };
+    for n_buffers in [1, 100] {
+        let message = load(n_buffers).unwrap_err().to_string();
+        assert!(message.contains("no more memory than a file of this size can need"), "{message}");
+    }
+}
+
+#[test]
+fn an_image_with_many_names_is_decoded_once() {
+    let folder = Folder::new("gltf-image-names");
+    std::fs::create_dir_all(folder.path("sub")).unwrap();
+    let png = encode_png(&Image::new(2, 2), &ImageOptions::default()).unwrap();
+    std::fs::write(folder.path("a.png"), png).unwrap();
+    std::fs::write(folder.path("b.png"), "no picture").unwrap();
+    let names = ["a.png", "./a.png", "sub/../a.png", "%61.png", "b.png", "./b.png"];
+    let images: Vec<Value> = names.iter().map(|name| json!({ "uri": name })).collect();
+    let textures: Vec<Value> = (0..names.len()).map(|i| json!({ "source": i })).collect();
+    let material = |i| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}});
+    let materials: Vec<Value> = (0..names.len()).map(material).collect();
+    let mut asset = triangle();
+    for (list, values) in [("images", images), ("textures", textures), ("materials", materials)] {
+        asset.json[list] = json!(values);
+    }
+    std::fs::write(folder.path("a.glb"), asset.glb()).unwrap();
+    let listener = Listener::default();
+    let (graph, _) = load_gltf(&folder.path("a.glb"), &listener).unwrap();
+    assert_eq!(graph.textures.len(), 1);
+    let n_textured =
+        graph.materials.iter().filter(|material| material.textures.base_color.is_some()).count();
+    assert_eq!(n_textured, 4);
+    assert!(listener.has_note("/images/4 is skipped") && !listener.has_note("/images/5"));
 }
 
 fn all_pointers(json: &Value, pointer: String, found: &mut Vec<String>) {

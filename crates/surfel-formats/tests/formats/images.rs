@@ -64,7 +64,8 @@ fn encode_png_returns_the_bytes_of_the_file() {
         save_image(&path, &image, &options).unwrap();
         assert_eq!(encode_png(&image, &options).unwrap(), std::fs::read(&path).unwrap());
     }
-    assert!(encode_png(&Image::new(0, 3), &ImageOptions::default()).is_err());
+    let error = encode_png(&Image::new(0, 3), &ImageOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("its encoder refuses") && !error.contains("disk"), "{error}");
 }
 
 #[test]
@@ -126,6 +127,56 @@ fn check_image_output_rejects_unwritable_paths() {
     std::fs::create_dir(folder.path("b.png")).unwrap();
     assert!(message("b.png").contains("name a file, not a folder"));
     surfel_formats::check_image_output(&folder.path("a.exr")).unwrap();
+}
+
+#[test]
+fn pictures_that_are_too_large_for_their_format_are_refused_before_the_work() {
+    use surfel_formats::check_image_size;
+    for (name, largest, too_large, limit) in [
+        ("a.webp", (16_384, 16_384), (16_385, 1), "WebP holds at most 16384x16384"),
+        ("a.WEBP", (16_384, 1), (1, 16_385), "WebP holds at most 16384x16384"),
+        ("a.jpg", (65_535, 65_535), (65_536, 1), "JPEG holds at most 65535x65535"),
+        ("a.jpeg", (1, 65_535), (1, 65_536), "JPEG holds at most 65535x65535"),
+        ("a.exr", (1_766_022, 20), (1_766_023, 20), "EXR holds at most 1766022x1073741822"),
+        ("a.tif", (1 << 28, 1), (1 << 15, 1 << 14), "TIFF holds less than 4 GiB"),
+        ("a.png", (1 << 28, 1), (1 << 31, 1), "PNG holds at most 2147483647"),
+        ("-", (1, 1), (1, 0), "choose at least 1x1"),
+        ("a.webp", (1, 1), (0, 1), "choose at least 1x1"),
+    ] {
+        check_image_size(Path::new(name), largest.0, largest.1).unwrap();
+        let error = check_image_size(Path::new(name), too_large.0, too_large.1).unwrap_err();
+        let found = format!("{name}: found a picture of {}x{} pixels", too_large.0, too_large.1);
+        let message = error.to_string();
+        assert!(message.starts_with(&found) && message.contains(limit), "{message}");
+    }
+}
+
+/// Returns the sides of a lossless WebP or a JPEG. The crate `image` reads WebP's greatest side as 0.
+fn sides_of(path: &Path) -> (u32, u32) {
+    let bytes = std::fs::read(path).unwrap();
+    if !bytes.starts_with(b"RIFF") {
+        return image::image_dimensions(path).unwrap();
+    }
+    // 14 bits each behind the signature of the lossless format, less one.
+    let bits = u32::from_le_bytes(*bytes[21..].first_chunk().unwrap());
+    (1 + (bits & 0x3fff), 1 + (bits >> 14 & 0x3fff))
+}
+
+#[test]
+fn encoders_take_the_largest_sides_that_the_check_allows() {
+    let folder = Folder::new("largest");
+    for (name, sides) in [("a.webp", 16_384), ("a.jpg", 65_535)] {
+        for (width, height) in [(sides, 1), (1, sides)] {
+            let path = folder.path(name);
+            save_image(&path, &Image::new(width, height), &ImageOptions::default()).unwrap();
+            assert_eq!(sides_of(&path), (width, height));
+        }
+        let too_wide = Image::new(sides + 1, 1);
+        let error = save_image(&folder.path(name), &too_wide, &ImageOptions::default());
+        let message = error.unwrap_err().to_string();
+        assert!(message.contains("choose a smaller size"), "{message}");
+        assert!(!message.contains("disk"), "{message}");
+    }
 }
 
 #[test]

@@ -2,7 +2,10 @@
 
 use surfel_core::points::{PointCloud, STATION};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{ColumnChoice, Error, LoadOptions, check_cloud_output, load, load_bytes};
+use surfel_formats::{
+    ColumnChoice, Error, ImageOptions, LoadOptions, MovieOptions, check_cloud_output, check_movie,
+    check_output_path, load, load_bytes,
+};
 
 use crate::common::{Folder, Listener, encode_cloud, full_cloud, read};
 use crate::{e57_writer, esri_grid, pcd, ptx};
@@ -194,6 +197,25 @@ fn pipes_and_devices_are_rejected_without_blocking() {
         assert!(error.contains("not a regular file"), "{error}");
         assert!(error.contains("write it to a file first"), "{error}");
     }
+    let options = MovieOptions {
+        width: 8,
+        height: 8,
+        fps: 25.0,
+        n_frames: 1,
+        image: ImageOptions::default(),
+        fingerprint: String::new(),
+    };
+    let movie = folder.path("movie.gif");
+    std::fs::rename(&pipe, &movie).unwrap();
+    for refused in [
+        check_output_path(&movie),
+        check_output_path(std::path::Path::new("/dev/null")),
+        check_movie(&movie, &options),
+    ] {
+        let error = refused.unwrap_err().to_string();
+        assert!(error.contains("not a regular file") && error.contains("name a file"), "{error}");
+    }
+    assert_eq!(folder.names(), ["movie.gif"]);
 }
 
 /// Returns the file with some bytes replaced.

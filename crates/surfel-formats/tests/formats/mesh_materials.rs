@@ -123,12 +123,36 @@ fn textures_are_read_once_and_missing_ones_are_reported() {
     assert_eq!(base.offset, Vec2::new(0.5, -2.25));
     assert_eq!((a.base_color, a.emissive), (Vec3::ONE, Vec3::ONE));
     let normal = a.textures.normal.unwrap();
-    assert_eq!((normal.0.texture, normal.1, graph.textures[normal.0.texture].width), (2, 0.5, 1));
+    // Both names of the first file have one texture.
+    assert_eq!((normal.0.texture, normal.1, graph.textures[normal.0.texture].width), (1, 0.5, 1));
+    assert_eq!((base.texture, graph.textures.len()), (0, 2));
     assert_eq!(b.textures.base_color, None);
     assert_eq!((b.base_color, b.textures.normal), (Vec3::splat(0.5), None));
     assert_eq!((b.emissive, b.textures.emissive), (Vec3::ZERO, None));
     assert!(listener.has_note("a texture is left out: ") && listener.has_note("none.png"));
     assert!(listener.has_note("(and 1 other)"));
+}
+
+#[test]
+fn a_texture_with_several_names_is_read_once() {
+    let mtl = "newmtl a\nmap_Kd one.png\nmap_Ke ./one.png\nnorm sub/../one.png\n\
+        newmtl b\nmap_Kd text.png\nmap_Ke ././text.png\n";
+    let obj = format!(
+        "mtllib a.mtl\nmtllib ./a.mtl\n{TRIANGLE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n"
+    );
+    let others = [
+        ("a.mtl", mtl.as_bytes()),
+        ("one.png", PNG),
+        ("sub/n.png", PNG),
+        ("text.png", b"no picture"),
+    ];
+    let (graph, _, listener) = load_with("names", &obj, &others);
+    assert_eq!((graph.materials.len(), graph.textures.len()), (2, 1));
+    let textures = &graph.materials[0].textures;
+    assert_eq!(textures.base_color.map(|base| base.texture), Some(0));
+    assert_eq!(textures.emissive.map(|emissive| emissive.texture), Some(0));
+    assert_eq!(textures.normal.map(|(normal, _)| normal.texture), Some(0));
+    assert!(listener.has_note("text.png") && !listener.has_note("other)"));
 }
 
 #[test]

@@ -377,13 +377,33 @@ fn check_movie_rejects_unwritable_movies() {
         let options = MovieOptions { fps, ..options() };
         assert!(message("movie.png", &options).contains("frames a second"));
     }
-    for (name, width, n_frames) in
-        [("movie.png", 0, 1), ("movie.gif", 65536, 1), ("a_#.png", 1 << 31, 1), ("a_#.png", 1, 0)]
-    {
+    for (name, width, n_frames) in [
+        ("movie.png", 0, 1),
+        ("movie.gif", 65536, 1),
+        ("a_#.png", 1 << 31, 1),
+        ("a_#.exr", 2_000_000, 1),
+        ("a_#.png", 1, 0),
+    ] {
         let options = MovieOptions { width, n_frames, ..options() };
         assert!(message(name, &options).contains("choose"));
     }
     assert_eq!(folder.names(), ["folder.gif"]);
+}
+
+#[test]
+fn no_memory_is_taken_for_frames_of_more_pixels_than_pictures_have() {
+    let folder = Folder::new("movies-huge");
+    let side = (1 << 31) - 1;
+    for (name, width, height) in
+        [("a.mp4", side, side), ("a.png", side, side), ("a.webm", 1 << 14, (1 << 14) + 1)]
+    {
+        let options = MovieOptions { width, height, ..options() };
+        let path = folder.path(name);
+        let message = check_movie(&path, &options).unwrap_err().to_string();
+        assert!(message.contains("at most 2^28 pixels"), "{message}");
+        assert!(Movie::open(&path, &options, false).is_err());
+    }
+    assert_eq!(folder.names(), [""; 0]);
 }
 
 #[test]

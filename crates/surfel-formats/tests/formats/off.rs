@@ -2,7 +2,7 @@
 
 use crate::common::{Folder, read, read_mesh};
 use surfel_core::math::{Vec3, Vec4};
-use surfel_formats::inspect;
+use surfel_formats::{inspect, inspect_bytes};
 
 const SQUARE: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
 
@@ -29,6 +29,24 @@ fn normals_and_colours_of_vertices_are_read() {
     assert_eq!(cloud.colors, Some(vec![[65535, 0, 32768], [0, 65535, 32768]]));
     let with_uvs = read("a.off", format!("STOFF\n4 0 0\n{}", SQUARE.replace('\n', " 0.5 0.5\n")));
     assert_eq!(with_uvs.unwrap().cloud.colors, None);
+}
+
+#[test]
+fn the_columns_are_those_of_the_first_word_and_of_the_lines() {
+    let columns = |file: &str| {
+        let stated = inspect_bytes("a.off", file.as_bytes()).unwrap().columns;
+        let loaded = read("a.off", file).unwrap();
+        (stated.join(" "), loaded.info.columns.join(" "), loaded.cloud)
+    };
+    let (stated, found, cloud) = columns("STCNOFF\n1 0 0\n1 2 3 0 0 1 255 0 0 0.25 0.5\n");
+    assert_eq!(stated, "x y z nx ny nz red green blue u v");
+    assert_eq!(found, stated);
+    let uv = ["u", "v"].map(|name| cloud.scalar(name).unwrap().get(0));
+    assert_eq!((uv, cloud.colors), ([0.25, 0.5], Some(vec![[65535, 0, 0]])));
+    // Colours that the first word does not announce.
+    let (stated, found, cloud) = columns("OFF\n1 0 0\n1 2 3 255 0 0\n");
+    assert_eq!((stated.as_str(), found.as_str()), ("x y z", "x y z red green blue"));
+    assert!(cloud.scalars.is_empty());
 }
 
 #[test]

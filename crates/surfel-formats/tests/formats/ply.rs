@@ -1,9 +1,14 @@
 //! PLY: all types, byte orders and header variants.
 
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::Values;
-use surfel_core::progress::NoProgress;
-use surfel_formats::{Column, ColumnChoice, LoadOptions, SaveOptions, load_bytes};
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_formats::{
+    Column, ColumnChoice, LoadOptions, SaveOptions, load_bytes, load_graph_bytes,
+};
 
 use crate::common::{Listener, read, round_trip};
 
@@ -261,4 +266,55 @@ fn incomplete_and_compressed_splats_are_named() {
         error.contains("compressed PLY of trained splats") && error.contains("export"),
         "{error}"
     );
+}
+
+/// The total of the last stage and the sum of what was finished in it.
+#[derive(Default)]
+struct Stage(Mutex<(u64, u64)>);
+
+impl Progress for Stage {
+    fn begin(&self, _stage: &str, total: u64) {
+        *self.0.lock().unwrap() = (total, 0);
+    }
+
+    fn advance(&self, units: u64) {
+        self.0.lock().unwrap().1 += units;
+    }
+}
+
+#[test]
+fn the_progress_of_faces_ends_at_its_total() {
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 3\nproperty char x\nproperty char y\n\
+            property char z\nelement face 2\nproperty list uchar uchar vertex_indices\n\
+            element strip 1\nproperty char i\nend_header\n"
+        )
+    };
+    let text = header("ascii") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1 0\n7\n";
+    let body = [0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2, 3, 2, 1, 0, 7];
+    let n_bytes = (text.len() - header("ascii").len()) as u64;
+    let binary = binary(&header("binary_little_endian"), &body);
+    for (file, total) in [(text.into_bytes(), n_bytes), (binary, 2)] {
+        let stage = Stage::default();
+        load_graph_bytes("a.ply", &file, &LoadOptions::default(), &stage).unwrap();
+        assert_eq!(*stage.0.lock().unwrap(), (total, total));
+    }
+}
+
+#[test]
+fn one_late_value_makes_words_colours_of_16_bits() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 50000\nproperty char x\n\
+        property char y\nproperty char z\nproperty ushort red\nproperty ushort green\n\
+        property ushort blue\nend_header\n";
+    let vertex = [0, 0, 0, 255, 0, 1, 0, 2, 0];
+    let mut bytes = binary(header, &vertex.repeat(50_000));
+    let color = |bytes: &[u8]| read("a.ply", bytes).unwrap().cloud.colors.unwrap()[0];
+    assert_eq!(color(&bytes), [65535, 257, 514]);
+    *bytes.last_mut().unwrap() = 1;
+    assert_eq!(color(&bytes), [255, 1, 2]);
+    let listener = Listener::default();
+    listener.cancelled.store(true, Ordering::Relaxed);
+    let cancelled = load_bytes("a.ply", &bytes, &LoadOptions::default(), &listener);
+    assert!(cancelled.unwrap_err().is_cancelled());
 }
