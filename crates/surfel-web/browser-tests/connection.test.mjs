@@ -51,10 +51,11 @@ test('a page reconnects and keeps its view', async () => {
   assert.notEqual(await finishedPixels(page), screen);
 });
 
-test('a link of a megabyte and a broken link open the initial view, with the reason', async () => {
+test('a link of a megabyte, a broken one and one that is nested too deep open the initial view, with the reason', async () => {
   const server = await serve(['town.ply'], ...QUICK);
   for (const [hash, reason] of [
     [encodeHash({ caption: 'x'.repeat(750_000) }), /too long/], [encodeHash({ color: 'elevation' }).slice(0, -3), /broken or incomplete/],
+    [`#view=${btoa(`${'{"a":'.repeat(150)}1${'}'.repeat(150)}`)}`, /broken or incomplete/],
   ]) {
     const page = await blankPage();
     open.push(page);

@@ -123,6 +123,29 @@ test('undo ends a transition and the turntable', async () => {
   await page.emulateMedia({ reducedMotion: 'reduce' });
 });
 
+test('undo in the middle of a drag stays, and the release changes nothing', async () => {
+  const clipBox = page.locator('#panel [data-key=clip_box]');
+  await change(() => clipBox.check());
+  const middle = async (locator) => {
+    const { x, y, width, height } = await locator.boundingBox();
+    return { x: x + width / 2, y: y + height / 2 };
+  };
+  const slider = page.locator('#panel [data-key="sun.azimuth"]');
+  await slider.scrollIntoViewIfNeeded();
+  for (const from of [await middle(slider), await middle(page.locator('[data-handle="box 2 max"]')), await pixelAt(page, 0.5, 0.2)]) {
+    const [scene, camera] = [await state(page, 'scene'), await state(page, 'camera')];
+    await page.mouse.move(from.x, from.y);
+    await page.mouse.down();
+    await page.mouse.move(from.x - 20, from.y + 20, { steps: 4 });
+    assert.notDeepEqual([await state(page, 'scene'), await state(page, 'camera')], [scene, camera]);
+    await page.keyboard.press('Control+z');
+    await page.mouse.up();
+    await settled(page);
+    assert.deepEqual([await state(page, 'scene'), await state(page, 'camera')], [scene, camera]);
+    assert.ok(!await redo().isDisabled());
+  }
+});
+
 test('a reload keeps camera, settings and measurements', async () => {
   await change(async () => drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.6)));
   await change(() => colorField().selectOption('elevation'));

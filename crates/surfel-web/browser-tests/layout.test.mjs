@@ -100,12 +100,15 @@ for (const [name, options] of Object.entries({ ...WINDOWS, ...MORE_WINDOWS })) {
       await page.locator('#toolbar [data-tool="profile"]').click();
     }
     for (const legend of [false, true]) {
-      const figure = { kind: 'profile', name: 'profile 1', points: LINE, width: 1 };
+      const figures = [
+        { kind: 'profile', name: 'profile 1', points: LINE, width: 1 },
+        { kind: 'annotation', name: 'a text that is longer than its field', points: LINE.slice(0, 1) },
+      ];
       await page.goto('about:blank');
-      await page.goto(server.link + encodeHash({ color: 'elevation', legend }, [figure]));
+      await page.goto(server.link + encodeHash({ color: 'elevation', legend }, figures));
       await settled(page);
       await page.locator('#measure-card').waitFor();
-      assert.deepEqual(await outOfReach(page), [], `measurements, ${legend}`);
+      assert.deepEqual([...(await outOfReach(page)), ...(await tooWide(page))], [], `measurements, ${legend}`);
       await page.locator('[aria-label="Show profile 1"]').click();
       await page.locator('#profile-card .note:not(:empty)').waitFor();
       assert.deepEqual(await outOfReach(page), [], `chart, ${legend}`);

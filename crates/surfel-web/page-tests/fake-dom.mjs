@@ -69,6 +69,14 @@ class FakeElement {
     return new Proxy({}, { get: () => () => {} });
   }
 
+  get valueAsNumber() {
+    return this.value === '' ? NaN : Number(this.value);
+  }
+
+  set valueAsNumber(value) {
+    this.value = value;
+  }
+
   get textContent() {
     return this.children.map((child) => child.textContent ?? child).join('');
   }

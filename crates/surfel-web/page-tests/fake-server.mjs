@@ -21,9 +21,11 @@ class FakeSocket {
   }
 }
 
-/** Timers that run when the test advances the time. */
+/** Timers that run when the test advances the time, and a clock that tests can set. */
 class FakeTimers {
   now_ms = 0;
+  /** Difference between the clock that the page reads and the time of the timers. */
+  clock_offset_ms = 0;
   #timers = new Map();
   #lastId = 0;
 
@@ -41,28 +43,36 @@ class FakeTimers {
     for (;;) {
       const [[id, timer] = []] = [...this.#timers].sort(([, a], [, b]) => a.at - b.at);
       if (!timer || end < timer.at) break;
-      this.now_ms = timer.at;
-      timer.at += timer.interval_ms;
+      this.now_ms = Math.max(this.now_ms, timer.at);
+      timer.at = this.now_ms + timer.interval_ms;
       if (timer.at === Infinity) this.clear(id);
       timer.run();
     }
-    this.now_ms = end;
+    this.now_ms = Math.max(this.now_ms, end);
+  }
+
+  /** Lets time pass in which no timer runs; those that are due run at once, an interval once, as after the sleep of a machine. */
+  sleep(duration_ms) {
+    this.now_ms += duration_ms;
+    this.advance(0);
   }
 }
 
 export const CAMERA = { position: [0, -5, 3], focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 35 };
 export const SCENE = { color: 'rgb', camera: CAMERA };
-const INFO = { name: 'town', bounds: { min: [0, 0, 0], max: [1, 1, 1] }, limits: { max_message_bytes: 1e6 } };
+const INFO = { name: 'town', up: [0, 0, 1], stations: [], bounds: { min: [0, 0, 0], max: [1, 1, 1] }, limits: { max_message_bytes: 1e6 } };
 
 /** A viewer that was opened with the settings of a link, and the server's end of its connection. */
 export function connectedViewer(linkPatch = {}) {
   const frames = [];
   const timers = new FakeTimers();
   const page = new EventTarget();
+  Object.defineProperty(globalThis, 'performance', { value: { now: () => timers.now_ms + timers.clock_offset_ms }, configurable: true });
   Object.assign(globalThis, {
     location: { protocol: 'http:', host: 'host' },
     WebSocket: FakeSocket,
     requestAnimationFrame: (run) => frames.push(run),
+    cancelAnimationFrame() {},
     setTimeout: (run, wait_ms) => timers.set(run, wait_ms),
     clearTimeout: (id) => timers.clear(id),
     setInterval: (run, wait_ms) => timers.set(run, wait_ms, wait_ms),
@@ -97,5 +107,5 @@ export function connectedViewer(linkPatch = {}) {
   };
   server.welcome();
   nextFrame();
-  return { viewer, server, nextFrame, page, wait };
+  return { viewer, server, nextFrame, page, wait, timers };
 }

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { filterName, rangeIn, rangeOf, withRange } from '../page/histogram.js';
+import { filterName, histogramChart, rangeIn, rangeOf, withRange } from '../page/histogram.js';
 import { histogramRows } from '../page/histogram-choice.js';
 import { signal } from '../page/signal.js';
 import { fakeDocument } from './fake-dom.mjs';
@@ -53,6 +53,41 @@ test('a step is a limit for whole numbers, of ten digits too', () => {
   assert.deepEqual(rangeOf([2, 5], { low: 1, high: 6 }, 1), [2, 5]);
   const [low, high] = [1234567891, 1234567899];
   assert.deepEqual(rangeOf([low, high], { low, high }, 1), [null, null]);
+});
+
+test('a handle that is dragged stays while settings arrive, and loses its place to an undo', () => {
+  const document = fakeDocument();
+  const changes = [];
+  const viewer = { scene: {}, sceneChanged: signal(), viewReplaced: signal(), changeSettings: (patch) => changes.push(patch) };
+  const show = (scene) => {
+    viewer.scene = scene;
+    viewer.sceneChanged();
+  };
+  const place = document.createElement('div');
+  histogramChart(viewer, place)('z', { low: 0, high: 100, width: 10, counts: Array(10).fill(3) });
+  const [low] = place.all('input');
+  const dragTo = (value) => {
+    low.value = value;
+    low.emit('input');
+  };
+  dragTo(30);
+  show({ filter: 'z >= 10', color: 'rgb' });
+  assert.equal(low.value, 30);
+  low.emit('change');
+  assert.deepEqual(changes, [{ filter: 'z >= 30' }]);
+  show({ filter: 'z >= 30' });
+  const timers = [];
+  globalThis.setTimeout = (run) => timers.push(run);
+  dragTo(40);
+  dragTo(30);
+  low.emit('pointerup');
+  for (const run of timers) run();
+  show({ filter: 'z >= 50' });
+  assert.equal(low.value, 50);
+  dragTo(60);
+  viewer.viewReplaced();
+  show({});
+  assert.equal(low.value, 0);
 });
 
 test('a new connection keeps the chosen column if the data has it', () => {

@@ -26,6 +26,13 @@ test('labels stand above each other, and those that moved have a line to their p
   assert.deepEqual(leaders.map(({ x1, y1 }) => [x1, y1]), [[410, 505], [420, 495]]);
 });
 
+test('labels stay between the sides of the picture', () => {
+  const { frames: [left, right] } = placed([[3, 300, 1], [799, 500, 1]]);
+  assert.deepEqual([left.x, right.x + right.width], [0, size.width]);
+  const { frames: [long] } = placed([[5, 300, 1]], { size: { ...size, width: 40 } });
+  assert.equal(long.x, 0);
+});
+
 test('labels outside of the picture, hidden ones and those without room are left out', () => {
   assert.equal(placed([[-1, 300, 1], [801, 300, 1], [400, 601, 1], [400, 300, -1]]).frames.length, 0);
   assert.equal(placed([[400, 300, 1]], { isHidden: () => true }).frames.length, 0);

@@ -64,6 +64,12 @@ test('invalid hashes are ignored', () => {
   }
 });
 
+test('a link that is nested deeper than the server reads is broken', () => {
+  const nested = (depth) => `#view=${btoa(`${'{"a":'.repeat(depth)}1${'}'.repeat(depth)}`).replace(/=+$/, '')}`;
+  assert.ok(decodeHash(nested(100)));
+  for (const depth of [101, 130, 10_000, 150_000]) assert.equal(decodeHash(nested(depth)), null, `${depth}`);
+});
+
 test('what is invalid in a link is reported', () => {
   const reports = (hash) => {
     const texts = [];

@@ -13,7 +13,7 @@ function rowOf(control, scene, info) {
   const document = fakeDocument();
   const changes = [];
   const viewer = {
-    scene, info, initialScene: scene, sceneChanged: signal(), cameraChanged: signal(), rejected: signal(),
+    scene, info, initialScene: scene, sceneChanged: signal(), cameraChanged: signal(), rejected: signal(), viewReplaced: signal(),
     changeSettings: (patch, isMoving) => {
       changes.push({ patch, isMoving });
       viewer.show(patch);
@@ -89,6 +89,23 @@ test('a drag that becomes a scroll ends, and one that ends by itself is reported
     for (const run of timers) run();
     assert.deepEqual(changes.map(({ isMoving }) => isMoving), [true, false], event);
   }
+});
+
+test('a drag keeps its value while other settings arrive, and loses it to an undo', () => {
+  const { viewer, changes, field, inputs: [range] } = rowOf(SPP, { spp: 4 });
+  const timers = [];
+  globalThis.setTimeout = (run) => timers.push(run);
+  range.value = 500;
+  range.emit('input');
+  viewer.show({ spp: 20, color: 'rgb' });
+  assert.equal(range.value, 500);
+  viewer.viewReplaced();
+  viewer.show({ spp: 10 });
+  assert.equal(range.value, 100);
+  // A browser reports no change after a value that was set by the page.
+  field.emit('pointerup');
+  for (const run of timers) run();
+  assert.equal(changes.length, 1);
 });
 
 test('a typed number is sent as it is, as the server says what it takes', () => {

@@ -1,8 +1,11 @@
-// Sun positions agree with almanacs.
+// Sun positions agree with almanacs, and the hour sets them.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { signal } from '../page/signal.js';
 import { sunAtHour, sunPosition } from '../page/sun.js';
+import { sunClock } from '../page/sun-clock.js';
+import { fakeDocument } from './fake-dom.mjs';
 
 const close = (a, b, tolerance) => assert.ok(Math.abs(a - b) < tolerance, `${a} is not ${b}`);
 
@@ -34,4 +37,23 @@ test('the sun rises in the east, sets in the west, and is in the north south of 
 test('the sun does not set in the arctic summer', () => {
   assert.ok(0 < sunAtHour('2026-06-21', 0, 70).elevation);
   assert.ok(sunAtHour('2026-12-21', 12, 70).elevation < 0);
+});
+
+test('an hour that is being dragged is taken back by an undo', () => {
+  const document = fakeDocument();
+  const changes = [];
+  const viewer = { scene: { light: ['sun'] }, sceneChanged: signal(), viewReplaced: signal(), changeSettings: (patch, isMoving) => changes.push(isMoving) };
+  const clock = sunClock(viewer);
+  const [day, hour, latitude] = clock.all('input');
+  Object.assign(hour, { value: 15 });
+  latitude.value = 45;
+  hour.emit('input');
+  hour.emit('change');
+  assert.deepEqual(changes, [true, false]);
+  hour.emit('input');
+  viewer.viewReplaced();
+  hour.emit('change');
+  day.value = '2026-06-21';
+  day.emit('change');
+  assert.deepEqual(changes, [true, false, true, false]);
 });

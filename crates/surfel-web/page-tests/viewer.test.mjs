@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { Navigation } from '../page/navigation.js';
 import { CAMERA, SCENE, connectedViewer } from './fake-server.mjs';
 
 const sceneFile = { name: 'a.toml', size: 2, text: async () => 'x' };
@@ -190,4 +191,117 @@ test('settings that are too long for the server are left out, and the connection
   assert.deepEqual([server.sent('set').length, viewer.scene.caption, rejections.length], [0, undefined, 1]);
   viewer.request({ type: 'export', width: 3, height: 2 });
   assert.equal(server.sent('export').length, 1);
+});
+
+test('settings and cameras that arrive in the middle of a drag leave it as it is', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  const answer = (number, seq, scene = {}) =>
+    server.send({ type: 'scene', number, seq, scene: { ...SCENE, ...scene }, camera: camera(9), legend: null });
+  viewer.setCamera(camera(1), true);
+  viewer.changeSettings({ sun: { azimuth: 10 } }, true);
+  // Before they are sent, while they are on their way, and once they have taken effect.
+  answer(2, 0, { color: 'class' });
+  assert.deepEqual([viewer.camera.position, viewer.scene.sun, viewer.scene.color], [[1, 0, 0], { azimuth: 10 }, 'class']);
+  nextFrame();
+  answer(3, 0, { color: 'normal' });
+  assert.deepEqual([viewer.camera.position, viewer.scene.sun, viewer.scene.color], [[1, 0, 0], { azimuth: 10 }, 'normal']);
+  answer(4, 2, { sun: { azimuth: 10, elevation: 5 } });
+  assert.deepEqual([viewer.camera.position, viewer.scene.sun], [[1, 0, 0], { azimuth: 10, elevation: 5 }]);
+  viewer.changeSettings({ sun: { azimuth: 20 } }, true);
+  viewer.setCamera(camera(2), false);
+  answer(5, 2, { sun: { azimuth: 10, elevation: 5 } });
+  nextFrame();
+  answer(6, 3, { sun: { azimuth: 20, elevation: 5 } });
+  assert.deepEqual([viewer.camera.position, viewer.scene.sun], [[2, 0, 0], { azimuth: 20, elevation: 5 }]);
+  assert.deepEqual(server.sent('camera').map(({ moving, camera: { position } }) => [moving, position[0]]), [[true, 1], [false, 2]]);
+});
+
+test('an undo in the middle of a drag shows the earlier view, at rest', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  const navigation = new Navigation(viewer);
+  navigation.orbit(30, 0);
+  viewer.changeSettings({ sun: { azimuth: 10 } }, true);
+  nextFrame();
+  assert.ok(viewer.isMoving && navigation.isActive);
+  viewer.showLink({});
+  nextFrame();
+  const [last] = server.sent('camera').slice(-1);
+  assert.deepEqual([viewer.camera, viewer.isMoving, navigation.isActive], [CAMERA, false, false]);
+  assert.deepEqual([last.camera, last.moving], [CAMERA, false]);
+  assert.deepEqual(server.sent('set').at(-1).scene, { sun: null });
+});
+
+test('a connection that is lost in the middle of a drag ends at rest', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  viewer.setCamera(camera(1), true);
+  nextFrame();
+  server.close();
+  viewer.setCamera(camera(2), true);
+  nextFrame();
+  server.welcome();
+  assert.deepEqual([viewer.camera.position, viewer.isMoving], [[2, 0, 0], true]);
+  viewer.setCamera(camera(3), false);
+  nextFrame();
+  assert.deepEqual(server.sent('camera').map(({ moving, camera: { position } }) => [moving, position[0]]), [[false, 3]]);
+});
+
+const HOUR_MS = 3_600_000;
+
+test('changes are sent and timed on a clock that jumps', () => {
+  for (const jump_ms of [-HOUR_MS, 5 * HOUR_MS]) {
+    const { viewer, server, nextFrame, wait, timers } = connectedViewer();
+    let isLost = false;
+    viewer.connectionChanged.listen(() => { isLost = true; });
+    viewer.setCamera(camera(1), true);
+    nextFrame();
+    timers.clock_offset_ms += jump_ms;
+    viewer.setCamera(camera(2), false);
+    nextFrame(jump_ms);
+    assert.equal(server.sent('camera').at(-1).camera.position[0], 2);
+    viewer.acknowledge({ frame: 1, seq: 1, scene: 1, finished: false });
+    viewer.acknowledge({ frame: 2, seq: 2, scene: 1, finished: true });
+    assert.ok(viewer.latencies_ms.every((latency) => 0 <= latency), `${viewer.latencies_ms}`);
+    // The connection is asked as before, and answers.
+    for (let i = 0; i < 3; i++) {
+      wait(10_000);
+      server.send({ type: 'pong' });
+    }
+    assert.deepEqual([isLost, server.sent('ping').length, viewer.isSynced], [false, 3, true]);
+  }
+});
+
+test('a machine that slept reads the answers that wait before it gives a connection up', () => {
+  const { viewer, server, wait, timers } = connectedViewer();
+  const losses = [];
+  viewer.connectionChanged.listen(({ isConnected }) => losses.push(isConnected));
+  wait(10_000);
+  assert.equal(server.sent('ping').length, 1);
+  timers.sleep(8 * HOUR_MS);
+  server.send({ type: 'pong' });
+  assert.deepEqual(losses, []);
+  wait(15_000);
+  server.send({ type: 'pong' });
+  assert.deepEqual(losses, []);
+  // A connection that ended meanwhile is given up as soon as after any other silence.
+  wait(10_000);
+  timers.sleep(8 * HOUR_MS);
+  wait(19_000);
+  assert.deepEqual(losses, []);
+  wait(1_000);
+  assert.deepEqual(losses, [false]);
+  wait(1_000);
+  server.welcome();
+  assert.deepEqual(losses, [false, true]);
+});
+
+test('a machine that sleeps while it connects tries again', () => {
+  const { viewer, server, wait, timers } = connectedViewer();
+  let nAttempts = 0;
+  viewer.connectionChanged.listen(({ isConnected }) => { nAttempts += isConnected ? 0 : 1; });
+  server.close();
+  timers.sleep(8 * HOUR_MS);
+  wait(21_000);
+  assert.equal(nAttempts, 2);
+  server.welcome();
+  assert.ok(viewer.isConnected);
 });

@@ -1,10 +1,11 @@
 // Controls of animated scenes: play, pause, scrub, loop, and whether the animation moves the camera.
 
 import { element, icon } from './dom.js';
+import { stopwatch } from './stopwatch.js';
 
 export function animationRows(viewer, section) {
   let isPlaying = false;
-  let startedAt = 0;
+  let elapsed_ms = null;
   let startTime = 0;
   const duration = () => viewer.info.duration_secs;
   const time = () => viewer.scene.time ?? 0;
@@ -28,13 +29,13 @@ export function animationRows(viewer, section) {
       viewer.changeSettings({ time: time() }, false);
       return;
     }
-    startedAt = performance.now();
+    elapsed_ms = stopwatch();
     startTime = duration() <= time() ? 0 : time();
     requestAnimationFrame(step);
   };
   const step = () => {
     if (!isPlaying) return;
-    let now = startTime + (performance.now() - startedAt) / 1000;
+    let now = startTime + elapsed_ms() / 1000;
     if (duration() <= now) {
       if (!loop.checked) {
         viewer.changeSettings({ time: duration() }, false);
@@ -42,7 +43,7 @@ export function animationRows(viewer, section) {
         return;
       }
       now %= duration();
-      [startTime, startedAt] = [now, performance.now()];
+      [startTime, elapsed_ms] = [now, stopwatch()];
     }
     viewer.changeSettings({ time: now }, true);
     requestAnimationFrame(step);

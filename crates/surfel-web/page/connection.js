@@ -6,6 +6,8 @@ const MAX_RECONNECT_DELAY_MS = 5000;
 const PING_INTERVAL_MS = 10_000;
 /** Duration without an answer after which a connection is given up. A large picture may arrive before the answer. */
 const MAX_SILENCE_MS = 20_000;
+/** Delay of a timer that means that the machine or the page slept: the answer may have arrived, and wait to be read. */
+const MIN_SLEEP_MS = 5_000;
 const HEADER_BYTES = 20;
 /** Rectangle and length before each file of a picture. */
 const PLACE_BYTES = 12;
@@ -105,9 +107,16 @@ export class Connection {
   }
 
   #awaitAnswer(socket) {
-    this.#silenceTimer ||= setTimeout(() => {
+    if (this.#silenceTimer) return;
+    const start = performance.now();
+    this.#silenceTimer = setTimeout(() => {
       this.#silenceTimer = 0;
       if (this.on.awaitsFile()) return;
+      if (MAX_SILENCE_MS + MIN_SLEEP_MS < performance.now() - start) {
+        this.send({ type: 'ping' });
+        this.#awaitAnswer(socket);
+        return;
+      }
       // A dead connection takes a minute to close.
       socket.onopen = socket.onmessage = socket.onclose = null;
       socket.close();

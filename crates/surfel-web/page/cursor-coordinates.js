@@ -6,6 +6,8 @@ import { coordinate, exact, withUnit } from './format.js';
 const MIN_PAUSE_MS = 80;
 /** The pause is at least this many times the duration of the last answer, so that slow ones take little of the server. */
 const PAUSE_PER_ANSWER = 2;
+/** A machine that slept counts its sleep as part of an answer. */
+const MAX_PAUSE_MS = 2000;
 
 /** The coordinates of a picked point, with the decimals of its file. */
 export function coordinatesText(point, unit) {
@@ -57,7 +59,7 @@ export class CursorCoordinates {
     this.#isWaiting = true;
     const point = await viewer.pick(pixel).catch(() => null);
     this.#isWaiting = false;
-    this.#pause_ms = Math.max(MIN_PAUSE_MS, PAUSE_PER_ANSWER * (performance.now() - start));
+    this.#pause_ms = Math.min(MAX_PAUSE_MS, Math.max(MIN_PAUSE_MS, PAUSE_PER_ANSWER * (performance.now() - start)));
     if (this.#pixel && !viewer.isMoving) this.text.textContent = point ? coordinatesText(point, viewer.info.unit) : '';
     if (this.#pixel !== pixel) this.#schedule();
   }

@@ -60,9 +60,11 @@ export function rangeOf(handles, { low, high }, step) {
 export function histogramChart(viewer, place) {
   let histogram = null;
   let column = '';
+  /** Whether a handle is being dragged, which sets the filter once it is released. */
+  let isDragging = false;
   const bars = svg('svg', { class: 'histogram-bars', preserveAspectRatio: 'none', 'aria-hidden': 'true' });
   const [low, high] = ['Lowest', 'Highest'].map((name) => element('input', {
-    type: 'range', class: 'histogram-handle', 'data-handle-name': name, oninput: () => showHandles(), onchange: () => apply(),
+    type: 'range', class: 'histogram-handle', 'data-handle-name': name, oninput: () => drag(), onchange: () => apply(),
   }));
   const readout = element('output', { class: 'note' });
   place.append(element('div', { class: 'histogram-plot' }, bars, low, high), readout);
@@ -102,11 +104,21 @@ export function histogramChart(viewer, place) {
     readout.textContent = `${shortest(from)} to ${shortest(to)}`;
   };
 
+  const drag = () => {
+    isDragging = true;
+    showHandles();
+  };
+
   const apply = () => {
+    isDragging = false;
     const range = rangeOf([low.valueAsNumber, high.valueAsNumber], histogram, Number(low.step));
     viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column, range) || null });
   };
 
-  viewer.sceneChanged.listen(() => { if (viewer.scene) showFilter(); });
+  viewer.sceneChanged.listen(() => { if (viewer.scene && !isDragging) showFilter(); });
+  viewer.viewReplaced.listen(() => { isDragging = false; });
+  // A handle reports no change if it is dragged back to its place, or if a touch becomes a scroll; others it reports after these events.
+  const endDrag = () => { if (isDragging) apply(); };
+  for (const handle of [low, high]) for (const event of ['pointerup', 'pointercancel']) handle.addEventListener(event, () => setTimeout(endDrag));
   return show;
 }

@@ -58,8 +58,9 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
     const isFast = held.has('shift');
     const directions = [...held].map((key) => FLY_DIRECTIONS[key]).filter(Boolean);
     const direction = directions.reduce((sum, one) => sum.map((value, i) => value + one[i]), [0, 0, 0]);
-    if (directions.length && last) {
-      navigation.fly(direction, Math.min(0.1, (now - last) / 1000), isFast ? FAST_FLY_SPEED : 1);
+    // The camera of other data may not have arrived yet.
+    if (directions.length && last && viewer.camera) {
+      navigation.fly(direction, Math.min(0.1, Math.max(0, now - last) / 1000), isFast ? FAST_FLY_SPEED : 1);
       navigation.settle();
     }
     last = now;

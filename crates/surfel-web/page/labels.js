@@ -29,8 +29,8 @@ export class Labels {
   }
 
   /**
-   * Adds a label with lines of text, of which the first is a name, above a point. None is added outside of the picture,
-   * without room, or if what it labels, `points`, is hidden.
+   * Adds a label with lines of text, of which the first is a name, above a point, and within the picture from side to side.
+   * None is added outside of the picture, without room, or if what it labels, `points`, is hidden.
    */
   add(point, lines, points) {
     const { size, toPixel, isHidden } = this.view;
@@ -39,7 +39,9 @@ export class Labels {
     if (!isInside || isHidden(points)) return;
     const width = MARGIN + LETTER_WIDTH * Math.max(...lines.map((text) => text.length));
     const height = 8 + LINE_HEIGHT * lines.length;
-    const frame = { x: foot.x, y: foot.y - height / 2 - GAP, width, height };
+    // A label that is wider than the picture begins at its left.
+    const x = Math.max(width / 2, Math.min(size.width - width / 2, foot.x));
+    const frame = { x, y: foot.y - height / 2 - GAP, width, height };
     if (!this.#moveAbove(frame)) return;
     for (const cell of cellsOf(frame)) this.#cells.set(cell, [...this.#framesIn(cell), frame]);
     const bottom = frame.y + height / 2;

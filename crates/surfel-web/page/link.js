@@ -6,6 +6,8 @@ import { areEqual, createPatch } from './merge-patch.js';
 /** The content of an address without a link. */
 const NO_LINK = { patch: {}, measurements: null };
 const PREFIX = '#view=';
+/** Maximum depth of objects and lists in a link; the server reads no message of more than 128. */
+const MAX_DEPTH = 100;
 /** Keys of the window and the files, which are not part of a view, and of measurements, which are not part of its patch. */
 const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output', 'measurements'];
 
@@ -45,7 +47,7 @@ export function decodeHash(hash) {
   try {
     const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
     const content = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
-    if (typeof content !== 'object' || content === null || Array.isArray(content)) return null;
+    if (typeof content !== 'object' || content === null || Array.isArray(content) || !isWithin(MAX_DEPTH, content)) return null;
     const { measurements, ...patch } = content;
     if (measurements === undefined) return { patch, measurements: null, n_invalid: 0 };
     const all = Array.isArray(measurements) ? measurements : [measurements];
@@ -54,6 +56,12 @@ export function decodeHash(hash) {
   } catch {
     return null;
   }
+}
+
+/** Whether objects and lists are nested at most `depth` deep. */
+function isWithin(depth, value) {
+  if (typeof value !== 'object' || value === null) return true;
+  return 0 < depth && Object.values(value).every((part) => isWithin(depth - 1, part));
 }
 
 /** A figure without the results of a volume, which come from the server. */

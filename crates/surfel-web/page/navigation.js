@@ -1,6 +1,7 @@
 // Navigation: moves the camera by hand, in smooth transitions, and on a turntable.
 
 import * as cameras from './camera.js';
+import { stopwatch } from './stopwatch.js';
 import { addScaled, distance, scale } from './vector.js';
 
 const TRANSITION_MS = 350;
@@ -129,9 +130,9 @@ export class Navigation {
       this.viewer.setCamera(camera, false);
       return;
     }
-    const start = performance.now();
+    const elapsed_ms = stopwatch();
     const step = () => {
-      const t = Math.min(1, (performance.now() - start) / TRANSITION_MS);
+      const t = Math.min(1, elapsed_ms() / TRANSITION_MS);
       this.viewer.setCamera(cameras.blend(from, camera, t * t * (3 - 2 * t)), t < 1);
       this.#animationRequest = t < 1 ? requestAnimationFrame(step) : 0;
     };
@@ -199,9 +200,9 @@ export class Navigation {
   follow(cameraAt, seconds, showTime) {
     this.stop();
     this.isFollowing = true;
-    const start = performance.now();
+    const elapsed_ms = stopwatch();
     const step = (now) => {
-      const time = Math.min(seconds, Math.max(0, now - start) / 1000);
+      const time = Math.min(seconds, elapsed_ms(now) / 1000);
       this.viewer.setCamera(cameraAt(time), true);
       showTime(time);
       if (seconds <= time) this.stop();

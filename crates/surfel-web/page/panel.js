@@ -23,6 +23,7 @@ export class Panel {
     viewer.cameraChanged.listen(() => viewer.scene
       && this.#rows.filter(({ control }) => control.followsCamera).forEach((row) => row.update()));
     viewer.rejected.listen((rejection) => this.#showRejection(rejection));
+    viewer.viewReplaced.listen(() => this.#rows.forEach((row) => row.dropDrag()));
   }
 
   /** Adds rows for these controls; returns their elements. */
@@ -72,6 +73,8 @@ function createRow(control, viewer, onChange) {
     isDragging = false;
     send(lastPatch, false);
   };
+  /** Ends a drag without its change: the view in which it began was replaced, as by undo. */
+  const dropDrag = () => { isDragging = false; };
   const field = fieldFactories[control.kind](control, change, id);
   const sceneKey = control.sceneKey ?? control.key;
   // A control of a whole scene key resets that key; a control of a part resets the value that it reads.
@@ -114,5 +117,5 @@ function createRow(control, viewer, onChange) {
     error.textContent = text;
     error.hidden = false;
   };
-  return { control, element: row, update, showError };
+  return { control, element: row, update, showError, dropDrag };
 }

@@ -5,6 +5,8 @@ const DOUBLE_CLICK_MS = 350;
 const DOUBLE_CLICK_PIXELS = 16;
 const WHEEL_PAUSE_MS = 300;
 const LINE_PIXELS = 16;
+/** Takes over a drag that has no effect any more. */
+const ENDED = { move() {}, end() {} };
 
 /**
  * `actions` has `click(pixel, event)`, `doubleClick(pixel)` and `hover(pixel, event)`, in pixels of the picture;
@@ -24,6 +26,9 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
       y: ((event.clientY - frame.top) * viewer.size.height) / frame.height,
     };
   };
+
+  // A drag of a view that is replaced meanwhile, as by undo, would bring parts of it back.
+  viewer.viewReplaced.listen(() => { if (drag) Object.assign(drag, { grabbed: ENDED, isClick: false }); });
 
   viewport.addEventListener('contextmenu', (event) => event.preventDefault());
 

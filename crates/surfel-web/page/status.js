@@ -43,7 +43,8 @@ export function setUpStatusLine(viewer) {
   viewer.frameShown.listen(() => {
     if (!isWorking) showIdle();
     const { width, height } = viewer.lastFrame;
-    numbers.textContent = `${width} × ${height}   ${samplesText(viewer.lastFrame)} samples`;
+    const samples = samplesText(viewer.lastFrame);
+    numbers.textContent = `${width} × ${height}   ${samples} ${samples === '1' ? 'sample' : 'samples'}`;
   });
   const rate = document.getElementById('rate');
   viewer.statsReceived.listen(({ frames_per_s }) => { rate.textContent = `${rounded(frames_per_s, 2)} frames/s`; });

@@ -24,8 +24,18 @@ export function sunClock(viewer) {
     const rounded = (value) => Math.round(value * 100) / 100;
     viewer.changeSettings(patchAt('sun', { azimuth: rounded(azimuth), elevation: rounded(elevation) }), isMoving);
   };
-  hour.addEventListener('input', () => change(true));
-  for (const field of [hour, day, latitude]) field.addEventListener('change', () => change(false));
+  let isDragging = false;
+  hour.addEventListener('input', () => {
+    isDragging = true;
+    change(true);
+  });
+  hour.addEventListener('change', () => {
+    if (isDragging) change(false);
+    isDragging = false;
+  });
+  // The end of a drag must not take back an undo.
+  viewer.viewReplaced.listen(() => { isDragging = false; });
+  for (const field of [day, latitude]) field.addEventListener('change', () => change(false));
   show();
 
   const row = (label, ...fields) => element('div', { class: 'row' },

@@ -239,7 +239,7 @@ export class Viewer {
     const { seq } = header;
     this.lastFrame = { ...header, shownAt: now };
     // Only the first picture of a message counts as its answer; later ones refine it.
-    if (this.#sendTimeBySeq.has(seq)) this.latencies_ms.push(now - this.#sendTimeBySeq.get(seq));
+    if (this.#sendTimeBySeq.has(seq)) this.latencies_ms.push(Math.max(0, now - this.#sendTimeBySeq.get(seq)));
     this.latencies_ms.splice(0, this.latencies_ms.length - MAX_LATENCIES);
     deleteBefore(this.#sendTimeBySeq, seq + 1);
     this.shownCamera = this.#cameraBySeq.get(seq) ?? this.camera;
@@ -275,7 +275,9 @@ export class Viewer {
   #scheduleFlush() {
     this.#flushRequest ||= requestAnimationFrame((now) => {
       this.#flushRequest = 0;
-      if (now - this.#flushedAt < MIN_FLUSH_INTERVAL_MS) {
+      const sinceFlush_ms = now - this.#flushedAt;
+      // A clock that was set back must not delay the message.
+      if (0 <= sinceFlush_ms && sinceFlush_ms < MIN_FLUSH_INTERVAL_MS) {
         this.#scheduleFlush();
         return;
       }
