@@ -51,3 +51,7 @@ test('cameras pass the keys, and lie between them as the interpolation says', ()
 test('a path of one key stands still', () => {
   assert.deepEqual(cameraAt([KEYS[1]], 'cubic', 0.5), KEYS[1].camera);
 });
+
+test('a path without keys has no camera', () => {
+  assert.equal(cameraAt([], 'cubic', 1), undefined);
+});

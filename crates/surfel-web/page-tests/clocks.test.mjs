@@ -32,7 +32,7 @@ function set() {
     clearTimeout() {},
   });
   document.querySelector = () => null;
-  const emitted = ['infoChanged', 'sceneChanged', 'cameraChanged', 'connectionChanged', 'frameShown', 'viewReplaced'];
+  const emitted = ['infoChanged', 'sceneChanged', 'cameraChanged', 'connectionChanged', 'frameShown', 'viewReplaced', 'viewRequested'];
   const viewer = {
     ...Object.fromEntries(emitted.map((name) => [name, signal()])),
     camera: START, scene: {}, size: { width: 400, height: 300 }, isMoving: false, isConnected: true,

@@ -15,7 +15,7 @@ function movedTo(camera) {
   globalThis.matchMedia = () => ({ matches: true });
   const given = { set: [], found: [] };
   const [setCamera, findCamera] = [(set) => given.set.push(set), (keys) => given.found.push(keys)];
-  const viewer = { camera: current, viewReplaced: signal(), setCamera, findCamera };
+  const viewer = { camera: current, viewReplaced: signal(), viewRequested: signal(), setCamera, findCamera };
   new Navigation(viewer).transitionTo(camera);
   return given;
 }
@@ -40,7 +40,7 @@ test('flying ends at a nearest and a farthest place, and leads back', () => {
   const start = { position: [0, -10, 5], focal_point: [0, 0, 0], view_up: [0, 0, 1] };
   for (const projection of [{ view_angle: 35 }, { orthographic: 8 }]) {
     const viewer = {
-      camera: { ...start, ...projection }, info: { bounds }, viewReplaced: signal(), setCamera(camera) { viewer.camera = camera; },
+      camera: { ...start, ...projection }, info: { bounds }, viewReplaced: signal(), viewRequested: signal(), setCamera(camera) { viewer.camera = camera; },
     };
     const navigation = new Navigation(viewer);
     const fly = (direction) => {

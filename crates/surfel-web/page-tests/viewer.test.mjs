@@ -62,6 +62,20 @@ test('what is exported has all changes made before', async () => {
   assert.equal(server.sent('save').length, 0);
 });
 
+test('what plays ends before the view is asked for', () => {
+  const { viewer, server, nextFrame } = connectedViewer();
+  let isPlaying = true;
+  viewer.viewRequested.listen(() => { isPlaying = false; });
+  viewer.request({ type: 'pick', x: 1, y: 1 });
+  assert.ok(isPlaying);
+  viewer.changeSettings({ time: 1 }, true);
+  viewer.request({ type: 'save', width: 3, height: 2 });
+  assert.ok(!isPlaying);
+  nextFrame();
+  server.send({ type: 'scene', number: 2, seq: 1, scene: { ...SCENE, time: 1 }, camera: CAMERA, legend: null });
+  assert.equal(server.sent('save').length, 1);
+});
+
 test('a rejected change delays an export no longer, and a lost connection ends it', async () => {
   const { viewer, server, nextFrame } = connectedViewer();
   viewer.changeSettings({ color: 'class' });

@@ -59,7 +59,9 @@ export function animationRows(viewer, section) {
     else if (viewer.camera) viewer.setCamera(viewer.camera, false);
   });
 
-  viewer.viewReplaced.listen(() => { if (isPlaying) setPlaying(false); });
+  const pause = () => { if (isPlaying) setPlaying(false); };
+  viewer.viewReplaced.listen(pause);
+  viewer.viewRequested.listen(pause);
   play.replaceChildren(icon('play'), 'Play');
   const followRow = toggleRow(follow, 'Follow', 'The animation moves the camera until you move it yourself\ncamera.lock');
   viewer.infoChanged.listen(() => {

@@ -43,10 +43,10 @@ export function fitsPath(keys, camera) {
   return Boolean(projection(camera)) && keys.every((key) => projection(key.camera) === projection(camera));
 }
 
-/** The camera at a time, as the movie has it: between keys as `interpolation` says, before and behind them as the next. */
+/** The camera at a time, as the movie has it: between keys as `interpolation` says, before and behind them as the next; none without a key. */
 export function cameraAt(keys, interpolation, time) {
   const next = keys.findIndex((key) => time < key.time);
-  if (next <= 0) return (next === 0 ? keys[0] : keys.at(-1)).camera;
+  if (next <= 0) return (next === 0 ? keys[0] : keys.at(-1))?.camera;
   const properties = Object.keys(keys[0].camera);
   return Object.fromEntries(properties.map((key) => [key, valueAt(keys, key, next, interpolation, time)]));
 }

@@ -134,24 +134,28 @@ viewer.connect();
 function whenNeeded(load) {
   let loaded = null;
   return async (...words) => {
+    let call;
     try {
       loaded ??= load();
-      (await loaded)(...words);
+      call = await loaded;
     } catch (error) {
       loaded = null;
       showToast(error.message);
+      return;
     }
+    call(...words);
   };
 }
 
 /** Picks or measures the point behind a pixel, as the tool does; `isPick` picks with any tool. */
 async function useTool(pixel, isPick) {
   const { tool } = viewer;
+  const { nCancelled } = measureTool;
   const isMeasuring = MEASURE_TOOLS.includes(tool) && !isPick;
   if (!isMeasuring && tool !== 'pick' && !isPick) return;
   lastPick = pickAfter(lastPick, pixel);
   const { point, error } = await lastPick;
-  if (viewer.tool !== tool) return;
+  if (viewer.tool !== tool || (isMeasuring && measureTool.nCancelled !== nCancelled)) return;
   if (error) showToast(error.message);
   else if (!point) showToast('There is no point here.');
   else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);

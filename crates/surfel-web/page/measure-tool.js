@@ -18,6 +18,8 @@ export class MeasureTool {
   pointer = null;
   /** The annotation that was made last, until its text can be typed. */
   newAnnotation = null;
+  /** Number of figures that were given up, for those who wait for a point of one. */
+  nCancelled = 0;
   /** Finished figures, each `{ kind, name, points }`, and the `width` of a profile. */
   #finished = [];
   /** The points of the unfinished figure. */
@@ -65,7 +67,7 @@ export class MeasureTool {
     if (kind === 'profile') figure.width = PROFILE_WIDTH * pathLength(figure.points);
     if (kind === 'volume') figure.base = 'lowest';
     if (kind === 'annotation') this.newAnnotation = figure;
-    this.cancel();
+    this.#clear();
     this.change([...this.#finished, figure]);
     if (kind === 'profile') this.profileOpened(figure);
   }
@@ -94,6 +96,11 @@ export class MeasureTool {
   }
 
   cancel() {
+    this.nCancelled += 1;
+    this.#clear();
+  }
+
+  #clear() {
     this.#points = [];
     this.pointer = null;
     this.overlay.redraw();

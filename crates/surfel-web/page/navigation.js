@@ -24,6 +24,7 @@ export class Navigation {
 
   constructor(viewer) {
     this.viewer = viewer;
+    viewer.viewRequested.listen(() => this.stop());
     viewer.viewReplaced.listen(() => {
       this.stop();
       if (this.isActive) this.endInteraction();
@@ -196,14 +197,17 @@ export class Navigation {
     this.#animationRequest = requestAnimationFrame(step);
   }
 
-  /** Follows a path for this many seconds, until the camera is moved otherwise. `cameraAt(time)` has its cameras. */
+  /** Follows a path for this many seconds, until the camera is moved otherwise. `cameraAt(time)` has its cameras; without one the
+   * path ends. */
   follow(cameraAt, seconds, showTime) {
     this.stop();
     this.isFollowing = true;
     const elapsed_ms = stopwatch();
     const step = (now) => {
       const time = Math.min(seconds, elapsed_ms(now) / 1000);
-      this.viewer.setCamera(cameraAt(time), true);
+      const camera = cameraAt(time);
+      if (!camera) return this.stop();
+      this.viewer.setCamera(camera, true);
       showTime(time);
       if (seconds <= time) this.stop();
       else this.#animationRequest = requestAnimationFrame(step);

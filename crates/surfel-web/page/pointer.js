@@ -30,7 +30,9 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
   // A drag of a view that is replaced meanwhile, as by undo, would bring parts of it back.
   viewer.viewReplaced.listen(() => { if (drag) Object.assign(drag, { grabbed: ENDED, isClick: false }); });
 
-  viewport.addEventListener('contextmenu', (event) => event.preventDefault());
+  viewport.addEventListener('contextmenu', (event) => {
+    if (!event.target.closest('[data-ui]')) event.preventDefault();
+  });
 
   viewport.addEventListener('pointerdown', (event) => {
     if (!viewer.camera || event.target.closest('[data-ui]')) return;

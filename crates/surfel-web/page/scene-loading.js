@@ -41,13 +41,22 @@ export function setUpSceneLoading(viewer, measureTool, addFiles) {
     viewer.showLink(patch);
     measureTool.figures = measurements ?? viewer.initialMeasurements;
   });
-  const lost = sessionStorage.getItem(ADDED);
+  const lost = storage()?.getItem(ADDED);
   if (lost) showToast(`${lost}: added to the page, and not kept when it is loaded again. Add it again.`);
-  sessionStorage.removeItem(ADDED);
+  storage()?.removeItem(ADDED);
   window.addEventListener('pagehide', () => {
     const names = namesOf(viewer.addedObjects);
-    if (names) sessionStorage.setItem(ADDED, names);
+    if (names) storage()?.setItem(ADDED, names);
   });
+}
+
+/** The storage of the tab; null where the browser keeps none for this site. */
+function storage() {
+  try {
+    return sessionStorage;
+  } catch {
+    return null;
+  }
 }
 
 const namesOf = (files) => files.map(({ name }) => name).join(', ');

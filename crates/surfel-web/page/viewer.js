@@ -38,6 +38,8 @@ export class Viewer {
   changedByUser = signal();
   /** Emits before scene and camera are replaced by those of a link, an earlier state, a scene file or other data. */
   viewReplaced = signal();
+  /** Emits before something is asked of the server that it makes of the view at rest. */
+  viewRequested = signal();
   /** Emits the measurements of a scene file that the user has chosen. */
   measurementsLoaded = signal();
   cameraChanged = signal();
@@ -216,6 +218,7 @@ export class Viewer {
   /** Resolves to the server's answer. The AbortSignal `abort` cancels; `progress` is called with progress messages. */
   request(message, { progress, abort } = {}) {
     const id = ++this.#lastRequestId;
+    if (VIEW_REQUESTS.includes(message.type)) this.viewRequested();
     return new Promise((resolve, reject) => {
       this.#requests.set(id, { type: message.type, resolve, reject, progress });
       this.#waitingRequests.push({ ...message, id });
