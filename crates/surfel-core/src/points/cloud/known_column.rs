@@ -43,7 +43,9 @@ impl KnownColumn {
 
     /// Returns the column with one of the usual names; case, separators and a unit in brackets do not matter.
     pub fn from_name(name: &str) -> Option<Self> {
-        let plain = plain_name(without_unit(name));
+        // Without letters that are not ASCII: in text of another encoding they are others.
+        let mut plain = plain_name(without_unit(name));
+        plain.retain(|letter| letter.is_ascii());
         Some(match plain.as_str() {
             "x" | "px" | "posx" | "xcoordinate" | "easting" | "east" | "rechtswert" | "ostwert" => {
                 Self::Position(0)
@@ -54,7 +56,7 @@ impl KnownColumn {
             | "altitude" | "alt" => Self::Position(2),
             name if LONGITUDES.contains(&name) => Self::Position(0),
             name if LATITUDES.contains(&name) => Self::Position(1),
-            // `Höhe` in any encoding, without the letter that is not ASCII.
+            // `Höhe`.
             "hhe" => Self::Position(2),
             // `Grün`.
             "grn" => Self::Color(1),
