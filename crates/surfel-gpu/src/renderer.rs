@@ -144,7 +144,7 @@ impl Renderer for GpuRenderer {
         let gpu = &self.gpu;
         gpu.check()?;
         let mut state = self.state();
-        let passes = Passes::new(scene, settings);
+        let passes = Passes::new(gpu, scene, settings)?;
         // Pictures have at most 2^28 pixels.
         let n_pixels = region.n_pixels() as u32;
         let (sizes, other_bytes) = state.make_room(gpu, scene, &passes, n_pixels)?;
@@ -254,7 +254,7 @@ mod tests {
         assert!(renderer.render(&scenes[0], &settings, &NoProgress).is_ok());
         let tree_bytes = renderer.upload_time().n_bytes;
         let sizes = renderer.state().arrays.as_ref().unwrap().sizes();
-        let passes = Passes::new(&scenes[0], &settings);
+        let passes = Passes::new(&renderer.gpu, &scenes[0], &settings).unwrap();
         let picture_bytes = Arrays::n_bytes(sizes) + scene_bytes(&scenes[0], &passes);
         // The limit fits a tree and its copy on the way, but no other tree.
         let limit = picture_bytes + 2 * tree_bytes + tree_bytes / 2;
