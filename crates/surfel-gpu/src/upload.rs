@@ -9,6 +9,7 @@ use crate::mesh_blocks::{block_vectors, mesh_blocks};
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES};
 use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
 use crate::unsupported::trees;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
@@ -71,7 +72,8 @@ pub type GpuGeometry = [Option<GpuTree>; 3];
 /// The geometries that are in a device's memory.
 #[derive(Debug, Default)]
 pub struct Uploads {
-    geometries: Vec<(Weak<FlatGeometry>, GpuGeometry)>,
+    /// The geometries by their addresses.
+    geometries: BTreeMap<usize, (Weak<FlatGeometry>, GpuGeometry)>,
     /// The trained Gaussians of these geometries in one tree.
     gaussians: Option<(Vec<Weak<FlatGeometry>>, GpuTree)>,
     /// The work so far.
@@ -109,11 +111,13 @@ impl Uploads {
     ) -> Result<()> {
         self.make_room(gpu, geometries, other_bytes)?;
         for geometry in geometries {
-            if self.position(geometry).is_none() {
+            if self.get(geometry).is_none() {
                 let start = Instant::now();
                 let uploaded = upload(gpu, geometry)?;
                 self.time.add(start, uploaded.iter().flatten());
-                self.geometries.push((Arc::downgrade(geometry), uploaded));
+                // A weak reference keeps its address from being used again.
+                let uploaded = (Arc::downgrade(geometry), uploaded);
+                self.geometries.insert(address(geometry), uploaded);
             }
         }
         self.update_gaussians(gpu, geometries)
@@ -131,13 +135,13 @@ impl Uploads {
         other_bytes: u64,
     ) -> Result<()> {
         // A geometry that was changed has lost its weak references.
-        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+        self.geometries.retain(|_, (geometry, _)| geometry.strong_count() != 0);
         if !self.has_gaussians_of(geometries) {
             self.gaussians = None;
         }
         if self.check_memory(gpu, geometries, other_bytes).is_err() {
-            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
-            self.geometries.retain(|(known, _)| is_needed(known));
+            let needed: BTreeSet<usize> = geometries.iter().map(address).collect();
+            self.geometries.retain(|known, _| needed.contains(known));
         }
         self.check_memory(gpu, geometries, other_bytes)
     }
@@ -149,10 +153,9 @@ impl Uploads {
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
     ) -> Result<()> {
-        let mut missing = Vec::new();
-        for (i, geometry) in geometries.iter().enumerate() {
-            let is_repeated = geometries[..i].iter().any(|other| Arc::ptr_eq(other, geometry));
-            if !is_repeated && self.position(geometry).is_none() {
+        let (mut missing, mut seen) = (Vec::new(), BTreeSet::new());
+        for geometry in geometries {
+            if self.get(geometry).is_none() && seen.insert(address(geometry)) {
                 missing.extend(geometry_sizes(geometry));
             }
         }
@@ -163,7 +166,7 @@ impl Uploads {
             check_pages(gpu, size.node_bytes, N_NODE_PAGES)?;
             check_pages(gpu, size.block_bytes, N_BLOCK_PAGES)?;
         }
-        let trees = self.geometries.iter().flat_map(|(_, trees)| trees.iter().flatten());
+        let trees = self.geometries.values().flat_map(|(_, trees)| trees.iter().flatten());
         let held = trees.chain(self.gaussians.as_ref().map(|(_, tree)| tree)).map(GpuTree::n_bytes);
         let missing: usize = missing.iter().map(|size| size.node_bytes + size.block_bytes).sum();
         let staging = missing.min(MAX_STAGING_BYTES);
@@ -206,12 +209,12 @@ impl Uploads {
 
     /// Returns a geometry that is uploaded.
     pub fn get(&self, geometry: &Arc<FlatGeometry>) -> Option<&GpuGeometry> {
-        self.position(geometry).map(|i| &self.geometries[i].1)
+        self.geometries.get(&address(geometry)).map(|(_, trees)| trees)
     }
+}
 
-    fn position(&self, geometry: &Arc<FlatGeometry>) -> Option<usize> {
-        self.geometries.iter().position(|(known, _)| is_same(known, geometry))
-    }
+fn address(geometry: &Arc<FlatGeometry>) -> usize {
+    Arc::as_ptr(geometry) as usize
 }
 
 /// Returns true if a weak reference is one to this geometry, as it was then.
@@ -339,4 +342,36 @@ pub fn check_array(gpu: &Gpu, n_bytes: usize) -> Result<()> {
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! A geometry counts once, however often a scene has it.
+
+    use super::*;
+    use crate::test_support::{open_gpu, scene_of_points};
+    use surfel_core::surface::SurfaceKind;
+
+    #[test]
+    fn a_geometry_that_a_scene_repeats_counts_once() {
+        let Some(mut gpu) = open_gpu() else { return };
+        let geometry = || Arc::clone(&scene_of_points(SurfaceKind::Disc).geometries[0]);
+        let (first, second) = (geometry(), geometry());
+        let sizes = [&first, &second].map(|geometry| geometry_sizes(geometry));
+        let sizes = sizes.iter().flatten().map(|size| size.node_bytes + size.block_bytes);
+        let n_bytes = sizes.sum::<usize>() as u64;
+        let geometries = [&first, &second, &first, &second].map(Arc::clone);
+        let mut uploads = Uploads::default();
+        // Before the upload as many bytes are on their way.
+        gpu.memory_limit = Some(2 * n_bytes);
+        assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
+        assert!(uploads.check_memory(&gpu, &geometries, 1).is_err());
+        uploads.update(&gpu, &geometries, 0).unwrap();
+        assert_eq!(uploads.time.n_bytes, n_bytes);
+        gpu.memory_limit = Some(n_bytes);
+        assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
+        // Those of other pictures make room.
+        assert!(uploads.make_room(&gpu, &geometries[..1], 1).is_ok());
+        assert!(uploads.get(&first).is_some() && uploads.get(&second).is_none());
+    }
 }
