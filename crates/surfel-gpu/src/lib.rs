@@ -38,6 +38,7 @@
 mod error;
 pub mod numbers;
 pub mod records;
+mod payload;
 mod field_arrays;
 mod constants;
 mod surface;

@@ -2,18 +2,19 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::field_arrays::{structure, structure_vectors};
-use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
+use crate::field_arrays::structure;
+use crate::gaussian_arrays::{gaussian_blocks, gaussian_clouds, gaussian_nodes};
 use crate::kernels::{Kernels, bind};
-use crate::mesh_blocks::{block_vectors, mesh_blocks};
-use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES};
-use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
+use crate::mesh_blocks::mesh_blocks;
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::payload::{Part, Payload};
+use crate::transfer::{MAX_STAGING_BYTES, Transfer};
 use crate::unsupported::trees;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
-use surfel_core::flat::{BlockTree, FlatGeometry};
+use surfel_core::flat::FlatGeometry;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -156,19 +157,19 @@ impl Uploads {
         let (mut missing, mut seen) = (Vec::new(), BTreeSet::new());
         for geometry in geometries {
             if self.get(geometry).is_none() && seen.insert(address(geometry)) {
-                missing.extend(geometry_sizes(geometry));
+                missing.extend(tree_contents(geometry));
             }
         }
         if self.gaussians.is_none() {
-            missing.push(gaussian_size(geometries));
+            missing.push(gaussian_contents(geometries));
         }
-        for size in &missing {
-            check_pages(gpu, size.node_bytes, N_NODE_PAGES)?;
-            check_pages(gpu, size.block_bytes, N_BLOCK_PAGES)?;
+        for tree in &missing {
+            check_pages(gpu, tree.nodes.len(), N_NODE_PAGES)?;
+            check_pages(gpu, tree.blocks.len(), N_BLOCK_PAGES)?;
         }
         let trees = self.geometries.values().flat_map(|(_, trees)| trees.iter().flatten());
         let held = trees.chain(self.gaussians.as_ref().map(|(_, tree)| tree)).map(GpuTree::n_bytes);
-        let missing: usize = missing.iter().map(|size| size.node_bytes + size.block_bytes).sum();
+        let missing: usize = missing.iter().map(TreeContents::len).sum();
         let staging = missing.min(MAX_STAGING_BYTES);
         gpu.check_memory(held.sum::<u64>() + (missing + staging) as u64 + other_bytes)
     }
@@ -179,8 +180,7 @@ impl Uploads {
             return Ok(());
         }
         let start = Instant::now();
-        let arrays = GaussianArrays::new(geometries);
-        if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
+        if let Some(tree) = upload_tree(gpu, &gaussian_contents(geometries))? {
             self.time.add(start, [&tree]);
             let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
             self.gaussians = Some((clouds.collect(), tree));
@@ -223,79 +223,62 @@ pub fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool
     known.as_ptr() == Arc::as_ptr(geometry)
 }
 
-/// The bytes of the arrays of a tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct TreeSize {
-    /// Bytes of the nodes, and of a structure behind them.
-    node_bytes: usize,
-    block_bytes: usize,
+/// The contents of the arrays of a tree.
+#[derive(Default)]
+struct TreeContents<'a> {
+    /// The nodes, and a structure behind them.
+    nodes: Payload<'a>,
+    blocks: Payload<'a>,
 }
 
-/// Returns the sizes of the trees of a geometry.
-fn geometry_sizes(geometry: &FlatGeometry) -> [TreeSize; 3] {
+impl TreeContents<'_> {
+    /// Returns the number of bytes.
+    fn len(&self) -> usize {
+        self.nodes.len() + self.blocks.len()
+    }
+}
+
+/// Returns the contents of a tree with these nodes and blocks.
+fn tree<'a>(nodes: &'a [BvhNode], blocks: Part<'a>) -> TreeContents<'a> {
+    let nodes = Part::nodes(nodes.len(), move |i| nodes[i]);
+    TreeContents { nodes: Payload(vec![nodes]), blocks: Payload(vec![blocks]) }
+}
+
+/// Returns the contents of the trees of a geometry.
+fn tree_contents(geometry: &FlatGeometry) -> [TreeContents<'_>; 3] {
     match geometry {
         FlatGeometry::Cloud(cloud) => {
-            let mut sizes = trees(cloud).map(|(_, points)| TreeSize {
-                node_bytes: points.nodes.len() * NODE_BYTES,
-                block_bytes: size_of_val(points.blocks.as_slice()),
+            let mut found = trees(cloud).map(|(_, points)| {
+                tree(&points.nodes, Part::Bytes(bytemuck::cast_slice(&points.blocks)))
             });
-            sizes[0].node_bytes += VECTOR_BYTES * structure_vectors(cloud);
-            sizes
+            found[0].nodes.0.extend(structure(cloud));
+            found
         }
         FlatGeometry::Mesh(mesh) => {
-            let n_vectors = mesh.triangles.blocks.len() * block_vectors(mesh) as usize;
-            let node_bytes = mesh.triangles.nodes.len() * NODE_BYTES;
-            let size = TreeSize { node_bytes, block_bytes: VECTOR_BYTES * n_vectors };
-            [size, TreeSize::default(), TreeSize::default()]
+            let tree = tree(&mesh.triangles.nodes, mesh_blocks(mesh));
+            [tree, TreeContents::default(), TreeContents::default()]
         }
     }
 }
 
-/// Returns the size of the tree of all trained Gaussians.
-fn gaussian_size(geometries: &[Arc<FlatGeometry>]) -> TreeSize {
-    let mut size = TreeSize::default();
-    for (_, gaussians) in gaussian_clouds(geometries) {
-        size.node_bytes += gaussians.nodes().len() * NODE_BYTES;
-        size.block_bytes += size_of_val(gaussians.blocks());
-        size.block_bytes += size_of_val(gaussians.coefficient_bits());
-    }
-    size
+/// Returns the contents of the tree of all trained Gaussians.
+fn gaussian_contents(geometries: &[Arc<FlatGeometry>]) -> TreeContents<'_> {
+    TreeContents { nodes: gaussian_nodes(geometries), blocks: gaussian_blocks(geometries) }
 }
 
 fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
-    let cloud = match geometry {
-        FlatGeometry::Cloud(cloud) => cloud,
-        FlatGeometry::Mesh(mesh) => {
-            let blocks = mesh_blocks(mesh);
-            let tree = upload_tree(gpu, &mesh.triangles.nodes, &[], bytemuck::cast_slice(&blocks));
-            return Ok([tree?, None, None]);
-        }
-    };
-    let structure = structure(cloud);
-    let tree = |tree_idx: usize| {
-        let (_, points) = trees(cloud)[tree_idx];
-        let behind_nodes: &[[u32; 4]] = if tree_idx == 0 { &structure } else { &[] };
-        let blocks = bytemuck::cast_slice(&points.blocks);
-        upload_tree(gpu, &points.nodes, bytemuck::cast_slice(behind_nodes), blocks)
-    };
-    Ok([tree(0)?, tree(1)?, tree(2)?])
+    let [first, second, third] = tree_contents(geometry);
+    Ok([upload_tree(gpu, &first)?, upload_tree(gpu, &second)?, upload_tree(gpu, &third)?])
 }
 
-/// Uploads a tree, with the bytes of a structure behind its nodes.
-fn upload_tree(
-    gpu: &Gpu,
-    tree_nodes: &[BvhNode],
-    behind_nodes: &[u8],
-    tree_blocks: &[u8],
-) -> Result<Option<GpuTree>> {
-    if tree_nodes.is_empty() {
+/// Uploads a tree, if it is not empty.
+fn upload_tree(gpu: &Gpu, tree: &TreeContents) -> Result<Option<GpuTree>> {
+    if tree.blocks.len() == 0 {
         return Ok(None);
     }
     let mut transfer = Transfer::new(gpu);
-    let payload = Payload { nodes: tree_nodes, bytes: behind_nodes };
-    let nodes = pages(&mut transfer, gpu, "nodes", payload)?;
-    let payload = Payload { nodes: &[], bytes: tree_blocks };
-    let blocks = pages(&mut transfer, gpu, "blocks", payload)?;
+    let nodes = pages(&mut transfer, gpu, "nodes", &tree.nodes)?;
+    let blocks = pages(&mut transfer, gpu, "blocks", &tree.blocks)?;
     transfer.finish()?;
     Ok(Some(GpuTree { nodes, blocks }))
 }
@@ -305,7 +288,7 @@ fn pages(
     transfer: &mut Transfer,
     gpu: &Gpu,
     label: &'static str,
-    payload: Payload,
+    payload: &Payload,
 ) -> Result<Vec<wgpu::Buffer>> {
     let n_bytes = payload.len();
     let page = |start: usize| {
@@ -357,9 +340,8 @@ mod tests {
         let Some(mut gpu) = open_gpu() else { return };
         let geometry = || Arc::clone(&scene_of_points(SurfaceKind::Disc).geometries[0]);
         let (first, second) = (geometry(), geometry());
-        let sizes = [&first, &second].map(|geometry| geometry_sizes(geometry));
-        let sizes = sizes.iter().flatten().map(|size| size.node_bytes + size.block_bytes);
-        let n_bytes = sizes.sum::<usize>() as u64;
+        let trees = [&first, &second].map(|geometry| tree_contents(geometry));
+        let n_bytes = trees.iter().flatten().map(TreeContents::len).sum::<usize>() as u64;
         let geometries = [&first, &second, &first, &second].map(Arc::clone);
         let mut uploads = Uploads::default();
         // Before the upload as many bytes are on their way.
