@@ -49,6 +49,7 @@ mod unsupported;
 mod mesh_blocks;
 mod gaussian_arrays;
 mod threads;
+mod turns;
 mod transfer;
 mod upload;
 mod scene_records;

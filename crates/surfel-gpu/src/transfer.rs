@@ -4,6 +4,7 @@ use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::payload::{Part, Payload};
 use crate::threads::for_each;
+use surfel_core::progress::Progress;
 
 /// Bytes of a chunk.
 const CHUNK_BYTES: usize = 1 << 24;
@@ -22,23 +23,33 @@ fn copy_in_parallel(payload: &Payload, offset: usize, target: wgpu::WriteOnly<[u
 }
 
 /// A transfer of which at most two chunks are on their way.
-#[derive(Debug)]
 pub struct Transfer<'a> {
     gpu: &'a Gpu,
+    progress: &'a dyn Progress,
     /// The chunk that the device copies.
     in_flight: Option<wgpu::SubmissionIndex>,
 }
 
 impl<'a> Transfer<'a> {
     /// Makes a transfer of nothing yet.
-    pub fn new(gpu: &'a Gpu) -> Self {
-        Self { gpu, in_flight: None }
+    pub fn new(gpu: &'a Gpu, progress: &'a dyn Progress) -> Self {
+        Self { gpu, progress, in_flight: None }
     }
 
     /// Fills an array with the bytes from `start` on.
-    pub fn fill(&mut self, buffer: &wgpu::Buffer, payload: &Payload, start: usize) -> Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// Fails if the device does, or once `progress` is cancelled.
+    pub fn fill(
+        &mut self,
+        buffer: &wgpu::Buffer,
+        payload: &Payload,
+        start: usize,
+    ) -> surfel_core::Result<()> {
         let size = buffer.size() as usize;
         for offset in (0..size).step_by(CHUNK_BYTES) {
+            self.progress.check()?;
             let n_bytes = CHUNK_BYTES.min(size - offset);
             let submitted = self.gpu.catch("points", || {
                 let n_bytes = wgpu::BufferSize::new(n_bytes as u64)?;
@@ -69,10 +80,19 @@ impl<'a> Transfer<'a> {
 }
 
 /// Fills an array.
-pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-    let mut transfer = Transfer::new(gpu);
+///
+/// # Errors
+///
+/// Fails if the device does, or once `progress` is cancelled.
+pub fn write(
+    gpu: &Gpu,
+    buffer: &wgpu::Buffer,
+    bytes: &[u8],
+    progress: &dyn Progress,
+) -> surfel_core::Result<()> {
+    let mut transfer = Transfer::new(gpu, progress);
     transfer.fill(buffer, &Payload(vec![Part::Bytes(bytes)]), 0)?;
-    transfer.finish()
+    Ok(transfer.finish()?)
 }
 
 #[cfg(test)]
@@ -81,10 +101,11 @@ mod tests {
 
     use super::*;
     use crate::numbers::{NODE_VECTORS, VECTOR_BYTES};
-    use crate::test_support::open_gpu;
+    use crate::test_support::{CancelledAfter, open_gpu};
     use bytemuck::Zeroable;
     use std::sync::mpsc;
     use surfel_core::bvh::BvhNode;
+    use surfel_core::progress::NoProgress;
     use wgpu::BufferUsages as Usage;
 
     fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<u8> {
@@ -122,7 +143,7 @@ mod tests {
         assert_eq!(payload.len(), expected.len());
         // The second array begins amid a node, the third one amid the bytes.
         let starts = [0, 16 * 1001, 400_000 * NODE_BYTES + 32];
-        let mut transfer = Transfer::new(&gpu);
+        let mut transfer = Transfer::new(&gpu, &NoProgress);
         let usage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         let arrays = starts.map(|start| {
             let buffer = gpu.buffer("test", (expected.len() - start) as u64, usage).unwrap();
@@ -142,8 +163,21 @@ mod tests {
         let usage = Usage::STORAGE | Usage::COPY_DST;
         let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
         gpu.device.destroy();
-        let error = write(&gpu, &buffer, &bytes).unwrap_err();
-        assert!(error.to_string().starts_with(&gpu.info.name), "{error}");
+        let error = write(&gpu, &buffer, &bytes, &NoProgress).unwrap_err();
+        assert!(error.to_string().contains(&gpu.info.name), "{error}");
         assert!(gpu.check().is_err());
+    }
+
+    #[test]
+    fn a_transfer_is_cancelled_between_chunks() {
+        let Some(gpu) = open_gpu() else { return };
+        let bytes = vec![0; 3 * CHUNK_BYTES];
+        let usage = Usage::STORAGE | Usage::COPY_DST;
+        let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
+        let write = |n| write(&gpu, &buffer, &bytes, &CancelledAfter::new(n));
+        for n in 0..3 {
+            assert_eq!(write(n), Err(surfel_core::Error::Cancelled));
+        }
+        assert_eq!(write(3), Ok(()));
     }
 }

@@ -15,6 +15,7 @@ use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::FlatGeometry;
+use surfel_core::progress::Progress;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -103,25 +104,27 @@ impl Uploads {
     ///
     /// # Errors
     ///
-    /// Fails if a geometry is too large for the device, before anything is uploaded.
+    /// Fails if a geometry is too large for the device, before anything is uploaded, or once `progress` is cancelled. What
+    /// was uploaded then stays.
     pub fn update(
         &mut self,
         gpu: &Gpu,
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
-    ) -> Result<()> {
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         self.make_room(gpu, geometries, other_bytes)?;
         for geometry in geometries {
             if self.get(geometry).is_none() {
                 let start = Instant::now();
-                let uploaded = upload(gpu, geometry)?;
+                let uploaded = upload(gpu, geometry, progress)?;
                 self.time.add(start, uploaded.iter().flatten());
                 // A weak reference keeps its address from being used again.
                 let uploaded = (Arc::downgrade(geometry), uploaded);
                 self.geometries.insert(address(geometry), uploaded);
             }
         }
-        self.update_gaussians(gpu, geometries)
+        self.update_gaussians(gpu, geometries, progress)
     }
 
     /// Frees geometries that are no longer in use, and those of other pictures if these and `other_bytes` need their memory.
@@ -175,12 +178,17 @@ impl Uploads {
     }
 
     /// Uploads the trained Gaussians of all geometries in one tree, unless they are there.
-    fn update_gaussians(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
+    fn update_gaussians(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         if self.gaussians.is_some() || gaussian_clouds(geometries).next().is_none() {
             return Ok(());
         }
         let start = Instant::now();
-        if let Some(tree) = upload_tree(gpu, &gaussian_contents(geometries))? {
+        if let Some(tree) = upload_tree(gpu, &gaussian_contents(geometries), progress)? {
             self.time.add(start, [&tree]);
             let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
             self.gaussians = Some((clouds.collect(), tree));
@@ -266,17 +274,26 @@ fn gaussian_contents(geometries: &[Arc<FlatGeometry>]) -> TreeContents<'_> {
     TreeContents { nodes: gaussian_nodes(geometries), blocks: gaussian_blocks(geometries) }
 }
 
-fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
+fn upload(
+    gpu: &Gpu,
+    geometry: &FlatGeometry,
+    progress: &dyn Progress,
+) -> surfel_core::Result<GpuGeometry> {
     let [first, second, third] = tree_contents(geometry);
-    Ok([upload_tree(gpu, &first)?, upload_tree(gpu, &second)?, upload_tree(gpu, &third)?])
+    let tree = |contents| upload_tree(gpu, &contents, progress);
+    Ok([tree(first)?, tree(second)?, tree(third)?])
 }
 
 /// Uploads a tree, if it is not empty.
-fn upload_tree(gpu: &Gpu, tree: &TreeContents) -> Result<Option<GpuTree>> {
+fn upload_tree(
+    gpu: &Gpu,
+    tree: &TreeContents,
+    progress: &dyn Progress,
+) -> surfel_core::Result<Option<GpuTree>> {
     if tree.blocks.len() == 0 {
         return Ok(None);
     }
-    let mut transfer = Transfer::new(gpu);
+    let mut transfer = Transfer::new(gpu, progress);
     let nodes = pages(&mut transfer, gpu, "nodes", &tree.nodes)?;
     let blocks = pages(&mut transfer, gpu, "blocks", &tree.blocks)?;
     transfer.finish()?;
@@ -289,7 +306,7 @@ fn pages(
     gpu: &Gpu,
     label: &'static str,
     payload: &Payload,
-) -> Result<Vec<wgpu::Buffer>> {
+) -> surfel_core::Result<Vec<wgpu::Buffer>> {
     let n_bytes = payload.len();
     let page = |start: usize| {
         let buffer = array(gpu, label, gpu.page_bytes().min(n_bytes - start))?;
@@ -333,6 +350,7 @@ mod tests {
 
     use super::*;
     use crate::test_support::{open_gpu, scene_of_points};
+    use surfel_core::progress::NoProgress;
     use surfel_core::surface::SurfaceKind;
 
     #[test]
@@ -348,7 +366,7 @@ mod tests {
         gpu.memory_limit = Some(2 * n_bytes);
         assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
         assert!(uploads.check_memory(&gpu, &geometries, 1).is_err());
-        uploads.update(&gpu, &geometries, 0).unwrap();
+        uploads.update(&gpu, &geometries, 0, &NoProgress).unwrap();
         assert_eq!(uploads.time.n_bytes, n_bytes);
         gpu.memory_limit = Some(n_bytes);
         assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
