@@ -1,6 +1,7 @@
 //! The trained Gaussians of all clouds of a scene in one tree of a device: rays composite them together.
 
 use crate::numbers::VECTOR_BYTES;
+use crate::payload::{Part, Payload};
 use std::sync::Arc;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGaussians, FlatGeometry, GaussianBlock};
@@ -17,15 +18,6 @@ pub struct GaussianRange {
     pub first_vector: u32,
     /// Vectors of four words that a block takes with the coefficients of its colours.
     pub block_vectors: u32,
-}
-
-/// The nodes and blocks of the Gaussians of all clouds.
-#[derive(Debug, Default)]
-pub struct GaussianArrays {
-    /// Nodes, with the indices that they have here.
-    pub nodes: Vec<BvhNode>,
-    /// Blocks, each followed by the coefficients of its colours.
-    pub blocks: Vec<u8>,
 }
 
 /// Returns the Gaussians of the geometries that have any, with the indices of the geometries.
@@ -58,23 +50,40 @@ fn block_vectors(gaussians: &FlatGaussians) -> u32 {
     ((size_of::<GaussianBlock>() + coefficients) / VECTOR_BYTES) as u32
 }
 
-impl GaussianArrays {
-    /// Returns the arrays of all Gaussians.
-    pub fn new(geometries: &[Arc<FlatGeometry>]) -> Self {
-        let mut arrays = Self::default();
-        for (_, gaussians) in gaussian_clouds(geometries) {
-            let first_node = arrays.nodes.len() as u32;
-            arrays.nodes.extend_from_slice(gaussians.nodes());
-            for node in &mut arrays.nodes[first_node as usize..] {
-                node.first_node = node.first_node.wrapping_add(first_node);
-            }
-            let n = 3 * gaussians.n_harmonics() * LANES;
-            let coefficients = gaussians.coefficient_bits().chunks(n);
-            for (block, coefficients) in gaussians.blocks().iter().zip(coefficients) {
-                arrays.blocks.extend_from_slice(bytemuck::bytes_of(block));
-                arrays.blocks.extend_from_slice(bytemuck::cast_slice(coefficients));
-            }
-        }
-        arrays
+/// Returns the nodes of all Gaussians, with the indices that they have among all.
+pub fn gaussian_nodes(geometries: &[Arc<FlatGeometry>]) -> Payload<'_> {
+    let ranges = gaussian_ranges(geometries).into_iter();
+    let clouds = ranges.zip(gaussian_clouds(geometries));
+    Payload(clouds.map(|(range, (_, gaussians))| nodes(gaussians, range.root_node)).collect())
+}
+
+/// Returns the blocks of all Gaussians, each followed by the coefficients of its colours.
+pub fn gaussian_blocks(geometries: &[Arc<FlatGeometry>]) -> Payload<'_> {
+    Payload(gaussian_clouds(geometries).map(|(_, gaussians)| blocks(gaussians)).collect())
+}
+
+fn nodes(gaussians: &FlatGaussians, root_node: u32) -> Part<'_> {
+    let nodes = gaussians.nodes();
+    Part::nodes(nodes.len(), move |i| {
+        let mut node: BvhNode = nodes[i];
+        node.first_node = node.first_node.wrapping_add(root_node);
+        node
+    })
+}
+
+fn blocks(gaussians: &FlatGaussians) -> Part<'_> {
+    let (blocks, coefficients) = (gaussians.blocks(), gaussians.coefficient_bits());
+    let n_coefficients = 3 * gaussians.n_harmonics() * LANES;
+    let lay_out = move |i: usize, words: &mut [u32]| {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+        let (of_block, of_coefficients) = bytes.split_at_mut(size_of::<GaussianBlock>());
+        of_block.copy_from_slice(bytemuck::bytes_of(&blocks[i]));
+        let coefficients = &coefficients[n_coefficients * i..][..n_coefficients];
+        of_coefficients.copy_from_slice(bytemuck::cast_slice(coefficients));
+    };
+    Part::Records {
+        n_records: blocks.len(),
+        n_words: block_vectors(gaussians) as usize * VECTOR_BYTES / 4,
+        lay_out: Box::new(lay_out),
     }
 }

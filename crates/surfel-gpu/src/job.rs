@@ -7,7 +7,7 @@ use crate::kernel_times::KernelTimes;
 use crate::kernels::Kernels;
 use crate::numbers::MAX_QUEUE_ENTRIES;
 use crate::part_size::PartSize;
-use crate::passes::{Pass, PassStage, Passes};
+use crate::passes::{Pass, Passes};
 use crate::pixel_order::{PixelOrder, set_pixels};
 use crate::records::{FrameRecord, HitRecord};
 use crate::scene_records::{SceneRecords, frame};
@@ -289,12 +289,8 @@ impl Job<'_> {
         submitter.is_primary = false;
         let mut n_waves = 0;
         loop {
-            for stage in &self.passes.shade {
-                match stage {
-                    PassStage::Once(passes) => submitter.add(passes)?,
-                    PassStage::Surfaces(passes) => submit_surfaces(submitter, passes)?,
-                }
-            }
+            submitter.add(&self.passes.shade)?;
+            self.submit_lights(submitter)?;
             let Some(next_wave) = &self.passes.next_wave else { return Ok(Outcome::Done) };
             n_waves += 1;
             if n_waves % WAVES_AT_ONCE == 0 {
@@ -310,6 +306,23 @@ impl Job<'_> {
             submitter.add([next_wave])?;
             submitter.add(&self.passes.trace)?;
         }
+    }
+
+    /// Gives the rays toward all lights to the device, sample by sample.
+    fn submit_lights(&self, submitter: &mut Submitter) -> surfel_core::Result<()> {
+        let Passes { lights, light_rays, surfaces, .. } = &self.passes;
+        for light in lights {
+            for sample in light.samples() {
+                submitter.add([&sample])?;
+                let Some(take) = &light.take else { continue };
+                submitter.add([take])?;
+                submitter.add(light_rays)?;
+                if !surfaces.is_empty() {
+                    submit_surfaces(submitter, surfaces)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Sets the AOVs of a part that was rendered, if they are wanted.

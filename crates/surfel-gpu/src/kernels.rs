@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
 use crate::shader::{Kernel, Resources};
 use std::collections::BTreeMap;
+use surfel_core::progress::Progress;
 
 /// Layouts of the arrays that kernels use, and the kernels compiled so far.
 #[derive(Debug)]
@@ -55,14 +56,16 @@ impl Kernels {
     ///
     /// # Errors
     ///
-    /// Fails if the driver refuses one.
+    /// Fails if the driver refuses one, or once `progress` is cancelled. The kernels that were compiled then stay.
     pub fn compile(
         &mut self,
         gpu: &Gpu,
         kernels: impl Iterator<Item = (Kernel, bool)>,
-    ) -> Result<()> {
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         for (kernel, is_paged) in kernels {
             if !self.compiled.contains_key(&(kernel, is_paged)) {
+                progress.check()?;
                 let [tree, paged_tree, scene, output] = &self.pipeline_layouts;
                 let layout = match kernel.resources() {
                     Resources::Tree if is_paged => paged_tree,

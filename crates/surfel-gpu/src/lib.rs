@@ -38,6 +38,7 @@
 mod error;
 pub mod numbers;
 pub mod records;
+mod payload;
 mod field_arrays;
 mod constants;
 mod surface;
@@ -48,6 +49,7 @@ mod unsupported;
 mod mesh_blocks;
 mod gaussian_arrays;
 mod threads;
+mod turns;
 mod transfer;
 mod upload;
 mod scene_records;

@@ -1,5 +1,7 @@
 //! The passes that render a sample of each pixel, and the tasks that they read.
 
+use crate::device::Gpu;
+use crate::error::{Error, Result};
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::records::{Task, Visit};
@@ -41,13 +43,24 @@ pub struct Pass {
     pub is_of_light: bool,
 }
 
-/// A part of the work on a wavefront.
-#[derive(Clone, Debug)]
-pub enum PassStage {
-    /// Passes that run once.
-    Once(Vec<Pass>),
-    /// Passes that take all rays toward a light through one surface each, and run until none is left.
-    Surfaces(Vec<Pass>),
+/// The passes that make the rays from points toward one light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPasses {
+    /// The pass of the first sample.
+    first_sample: Pass,
+    /// Maximum number of samples at a point. Their tasks follow that of the first.
+    n_samples: u32,
+    /// The pass that takes the rays of a sample; none for a headlight, whose light needs no rays.
+    pub take: Option<Pass>,
+}
+
+impl LightPasses {
+    /// Returns the pass of each sample.
+    pub fn samples(&self) -> impl Iterator<Item = Pass> {
+        let Self { first_sample, n_samples, .. } = *self;
+        let task_offset = move |i| first_sample.task_offset + i * RECORD_STRIDE as u32;
+        (0..n_samples).map(move |i| Pass { task_offset: task_offset(i), ..first_sample })
+    }
 }
 
 /// The passes of one sample, and what they read.
@@ -57,8 +70,15 @@ pub struct Passes {
     pub camera: Vec<Pass>,
     /// The passes that find the hits of a wavefront.
     pub trace: Vec<Pass>,
-    /// The passes that shade them.
-    pub shade: Vec<PassStage>,
+    /// The passes that shade them and take the queue of points that receive light.
+    pub shade: Vec<Pass>,
+    /// The passes of each light.
+    pub lights: Vec<LightPasses>,
+    /// The passes that find out how much light the rays of a sample bring, the same for all samples of all lights.
+    pub light_rays: Vec<Pass>,
+    /// The passes behind these that take all rays toward a light through one surface each, and run until none is left;
+    /// none if no surface lets light through.
+    pub surfaces: Vec<Pass>,
     /// The passes that begin the next wavefront; none if there is only one.
     pub next_wave: Option<Pass>,
     /// The pass after all samples.
@@ -76,7 +96,31 @@ pub struct Passes {
 
 impl Passes {
     /// Returns the passes that render one sample of each pixel.
-    pub fn new(scene: &FlatScene, settings: &Settings) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// Fails if the device allows no array of so many tasks, before those of light samples are made.
+    pub fn new(gpu: &Gpu, scene: &FlatScene, settings: &Settings) -> Result<Self> {
+        // The offset of a task has 32 bits.
+        let found = gpu.device.limits().max_buffer_size.min(u32::MAX.into());
+        Self::with_task_bytes(found, scene, settings).map_err(|needed| {
+            let limit = "bytes of tasks (samples of lights and the like)";
+            Error::Limit { device: gpu.info.name.clone(), limit, found, needed }
+        })
+    }
+
+    /// Returns the passes, or the bytes that their tasks need if these are more than `max_bytes`.
+    fn with_task_bytes(
+        max_bytes: u64,
+        scene: &FlatScene,
+        settings: &Settings,
+    ) -> std::result::Result<Self, u64> {
+        let light_samples = light_samples(scene, settings);
+        let n_samples = light_samples.iter().map(|(_, max_samples)| u64::from(*max_samples));
+        let sample_bytes = RECORD_STRIDE * n_samples.sum::<u64>();
+        if max_bytes < sample_bytes {
+            return Err(sample_bytes);
+        }
         let mut passes = Self::default();
         let TreeVisits { trees, gaussians, visits } = TreeVisits::new(scene);
         passes.visits = visits;
@@ -86,46 +130,39 @@ impl Passes {
             passes.tree_pass(Kernel::Gaussians, TreeRef::Gaussians, &gaussians, queue::PATHS);
         passes.trace.extend(light);
         let shade = passes.pass(Kernel::Shade, Size::Queue(queue::PATHS), Task::default());
-        let mut once = vec![shade];
-        once.push(passes.take(queue::POINTS, ray_kind::UNCOUNTED));
-        for (light_idx, (kind, max_samples)) in
-            light_samples(scene, settings).into_iter().enumerate()
-        {
-            for sample_idx in 0..max_samples {
-                let task =
-                    Task { light: light_idx as u32, sample_idx, max_samples, ..Task::default() };
-                let mut sample = passes.pass(Kernel::SampleLight, Size::Queue(queue::POINTS), task);
-                sample.is_of_light = true;
-                once.push(sample);
-                if let Some(kind) = kind {
-                    passes.add_light_passes(scene, (&trees, &gaussians), kind, &mut once);
-                }
-            }
+        passes.shade = vec![shade, passes.take(queue::POINTS, ray_kind::UNCOUNTED)];
+        for (light, (kind, max_samples)) in (0..).zip(&light_samples) {
+            passes.add_light(light, *kind, *max_samples);
         }
-        passes.shade.push(PassStage::Once(once));
+        if light_samples.iter().any(|(kind, _)| kind.is_some()) {
+            passes.add_light_rays(scene, &trees, &gaussians);
+        }
         if scene.materials.iter().any(has_branches) {
             passes.next_wave = Some(passes.take(queue::PATHS, ray_kind::SECONDARY));
         }
         passes.resolve = Some(passes.pass(Kernel::Resolve, Size::Pixels, Task::default()));
         passes.add_aov_passes(&trees, &gaussians, settings);
-        passes
+        let n_bytes = passes.tasks.len() as u64;
+        if max_bytes < n_bytes { Err(n_bytes) } else { Ok(passes) }
     }
 
-    /// Returns every pass.
+    /// Returns every pass, of those that differ in their samples of a light only the first.
     pub fn all(&self) -> impl Iterator<Item = &Pass> {
-        let shade = self.shade.iter().flat_map(|stage| match stage {
-            PassStage::Once(passes) | PassStage::Surfaces(passes) => passes,
-        });
+        let samples = self.lights.iter().map(|light| &light.first_sample);
+        let takes = self.lights.iter().filter_map(|light| light.take.as_ref());
+        let light = samples.chain(takes).chain(&self.light_rays).chain(&self.surfaces);
         let aovs = self.aov_hits.iter().chain(&self.aov_supports);
         let last = self.next_wave.iter().chain(&self.resolve);
-        self.camera.iter().chain(&self.trace).chain(shade).chain(last).chain(aovs)
+        let first = self.camera.iter().chain(&self.trace).chain(&self.shade);
+        first.chain(light).chain(last).chain(aovs)
     }
 
     /// Returns a pass without a tree.
     pub fn pass(&mut self, kernel: Kernel, size: Size, task: Task) -> Pass {
+        // `Passes::new` fails if the offsets exceed this.
         let task_offset = self.tasks.len() as u32;
         self.tasks.extend_from_slice(bytemuck::bytes_of(&task));
-        self.tasks.resize(task_offset as usize + RECORD_STRIDE as usize, 0);
+        self.tasks.resize(self.tasks.len().next_multiple_of(RECORD_STRIDE as usize), 0);
         Pass { kernel, tree: None, task_offset, size, is_of_light: false }
     }
 
@@ -214,39 +251,51 @@ impl Passes {
         passes
     }
 
+    /// Adds the passes that make the rays toward a light, of this kind.
+    fn add_light(&mut self, light: u32, ray_kind: Option<u32>, max_samples: u32) {
+        let of_light = |pass: Pass| Pass { is_of_light: true, ..pass };
+        let size = Size::Queue(queue::POINTS);
+        let first = Task { light, max_samples, ..Task::default() };
+        let first_sample = of_light(self.pass(Kernel::SampleLight, size, first));
+        for sample_idx in 1..max_samples {
+            self.pass(Kernel::SampleLight, size, Task { sample_idx, ..first });
+        }
+        let take = ray_kind.map(|kind| of_light(self.take(queue::LIGHT_RAYS, kind)));
+        self.lights.push(LightPasses { first_sample, n_samples: max_samples, take });
+    }
+
     /// Adds the passes that find out how much light the rays of a sample bring.
-    fn add_light_passes(
+    fn add_light_rays(
         &mut self,
         scene: &FlatScene,
-        (trees, gaussians): (&[TreeInstances], &Range<u32>),
-        ray_kind: u32,
-        once: &mut Vec<Pass>,
+        trees: &[TreeInstances],
+        gaussians: &Range<u32>,
     ) {
-        let task = Task { queue: queue::LIGHT_RAYS, ray_kind, ..Task::default() };
+        let task = Task { queue: queue::LIGHT_RAYS, ..Task::default() };
         let size = Size::Queue(queue::LIGHT_RAYS);
         let of_light = |pass: Pass| Pass { is_of_light: true, ..pass };
-        once.push(of_light(self.pass(Kernel::TakeQueue, Size::One, task)));
+        let mut passes = Vec::new();
         for tree in trees {
-            once.extend(self.tree_search(&ANY, tree, &tree.opaque, queue::LIGHT_RAYS));
+            passes.extend(self.tree_search(&ANY, tree, &tree.opaque, queue::LIGHT_RAYS));
         }
-        once.extend(self.tree_pass(
+        passes.extend(self.tree_pass(
             Kernel::GaussianShadow,
             TreeRef::Gaussians,
             gaussians,
             queue::LIGHT_RAYS,
         ));
+        let last = if scene.is_transmissive { Kernel::ClearHits } else { Kernel::AddLight };
+        passes.push(of_light(self.pass(last, size, task)));
+        self.light_rays = passes;
         if !scene.is_transmissive {
-            once.push(of_light(self.pass(Kernel::AddLight, size, task)));
             return;
         }
-        once.push(of_light(self.pass(Kernel::ClearHits, size, task)));
-        self.shade.push(PassStage::Once(std::mem::take(once)));
         let mut surfaces = Vec::new();
         for tree in trees {
             surfaces.extend(self.closest(tree, &tree.transmissive, queue::LIGHT_RAYS));
         }
         surfaces.push(of_light(self.pass(Kernel::PassSurface, size, task)));
-        self.shade.push(PassStage::Surfaces(surfaces));
+        self.surfaces = surfaces;
     }
 
     /// Adds the passes for AOVs. If there is one sample and one wavefront, it has left its hits, if all are on surfaces.
@@ -306,4 +355,71 @@ fn light_samples(scene: &FlatScene, settings: &Settings) -> Vec<(Option<u32>, u3
         (Some(ray_kind::SHADOW), n_samples(lamp.radius <= 0.0 || is_directional))
     });
     lights.chain(lamps).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! The samples of all lights share their passes, and pictures with too many tasks are refused.
+
+    use super::*;
+    use crate::test_support::{open_gpu, scene_of_points};
+    use surfel_core::math::Vec3;
+    use surfel_core::scene::Sky;
+    use surfel_core::surface::SurfaceKind;
+
+    /// Returns a scene of points under two skies and a headlight.
+    fn scene_under_skies() -> FlatScene {
+        let (up, zenith, ground) = (Vec3::Z, Vec3::ONE, Vec3::ZERO);
+        let sky = Light::Sky(Sky { up, zenith, ground, ao_distance: f32::INFINITY });
+        let lights = vec![sky.clone(), Light::Headlight(1.0), sky];
+        let mut scene = scene_of_points(SurfaceKind::Smooth);
+        scene.lights = lights;
+        scene
+    }
+
+    fn settings(light_samples: u32) -> Settings {
+        Settings { samples_per_pixel: 1, light_samples, ..Settings::default() }
+    }
+
+    #[test]
+    fn samples_of_lights_share_the_passes_of_their_rays() {
+        let scene = scene_under_skies();
+        let passes = |n| Passes::with_task_bytes(u32::MAX.into(), &scene, &settings(n)).unwrap();
+        let (few, many) = (passes(1), passes(1000));
+        assert_eq!(few.all().count(), many.all().count());
+        // A sample has a task of its own, and no more.
+        let task_bytes = 2 * 999 * RECORD_STRIDE as usize;
+        assert_eq!(many.tasks.len() - few.tasks.len(), task_bytes);
+        assert!(many.lights.iter().map(|light| light.take.is_some()).eq([true, false, true]));
+    }
+
+    #[test]
+    fn passes_of_samples_have_the_tasks_of_their_light_and_sample() {
+        let passes = Passes::with_task_bytes(u64::MAX, &scene_under_skies(), &settings(3)).unwrap();
+        let task = |pass: Pass| {
+            let bytes = &passes.tasks[pass.task_offset as usize..][..size_of::<Task>()];
+            let Task { light, sample_idx, max_samples, .. } = bytemuck::pod_read_unaligned(bytes);
+            (light, sample_idx, max_samples)
+        };
+        let found: Vec<_> =
+            passes.lights.iter().flat_map(|light| light.samples().map(task)).collect();
+        let sky = |light| (0..3).map(move |sample_idx| (light, sample_idx, 3));
+        let expected: Vec<_> = sky(0).chain([(1, 0, 1)]).chain(sky(2)).collect();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn too_many_tasks_are_refused() {
+        let mut scene = scene_under_skies();
+        let passes = |bytes, n| Passes::with_task_bytes(bytes, &scene, &settings(n)).map(|_| ());
+        let sample_bytes = RECORD_STRIDE * (2 * 1000 + 1);
+        assert_eq!(passes(sample_bytes - 1, 1000), Err(sample_bytes));
+        // The other passes have tasks as well.
+        assert!(passes(sample_bytes, 1000).is_err_and(|needed| sample_bytes < needed));
+        let Some(gpu) = open_gpu() else { return };
+        scene.lights = vec![scene.lights[0].clone(); 1000];
+        let error = Passes::new(&gpu, &scene, &settings(1 << 16)).unwrap_err();
+        let expected = "of lights and the like), 16777216000 are needed";
+        assert!(error.to_string().ends_with(expected), "{error}");
+    }
 }

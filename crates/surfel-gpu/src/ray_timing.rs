@@ -87,7 +87,7 @@ pub fn time(
     let fits_memory = |sizes| uploads.check_memory(gpu, geometries, Arrays::n_bytes(sizes)).is_ok();
     let found = Arrays::free_unless_fitting(arrays, gpu, sizes, fits_memory)?;
     let secs_before = uploads.time.secs;
-    uploads.update(gpu, geometries, Arrays::n_bytes(found))?;
+    uploads.update(gpu, geometries, Arrays::n_bytes(found), progress)?;
     let mut times = RayTimes {
         geometry_upload_secs: uploads.time.secs - secs_before,
         run_secs: vec![0.0; timing.n_runs as usize],
@@ -98,7 +98,8 @@ pub fn time(
     searches.retain(|search| tree(search.tree).is_some());
     let passes = passes(&searches);
     let is_paged = |pass: &Pass| pass.tree.and_then(tree).is_some_and(GpuTree::is_paged);
-    kernels.compile(gpu, passes.all().map(|pass| (pass.kernel, is_paged(pass))))?;
+    let needed = passes.all().map(|pass| (pass.kernel, is_paged(pass)));
+    kernels.compile(gpu, needed, progress)?;
     let kernels = &*kernels;
     let trees = bind_trees(gpu, kernels, tree, &passes)?;
     let arrays = Arrays::update(arrays, gpu, sizes)?;

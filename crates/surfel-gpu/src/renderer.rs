@@ -11,10 +11,10 @@ use crate::picture_memory::scene_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::scene_words::SceneWords;
+use crate::turns::Turns;
 use crate::unsupported::unsupported;
 use crate::upload::{GpuTree, UploadTime, Uploads};
 use crate::wavefront::{Arrays, Capacities};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
@@ -24,7 +24,8 @@ use surfel_core::render::{RenderRegion, RenderStats, Renderer, Settings, check};
 #[derive(Debug)]
 pub struct GpuRenderer {
     gpu: Gpu,
-    state: Mutex<State>,
+    /// A panic leaves nothing half done here: kernels and uploads are added when they are complete.
+    state: Turns<State>,
 }
 
 /// Kernels, points and arrays, kept from picture to picture.
@@ -66,7 +67,7 @@ impl GpuRenderer {
             part_size: None,
             times: KernelTimes::default(),
         };
-        Ok(Self { gpu, state: Mutex::new(state) })
+        Ok(Self { gpu, state: Turns::new(state) })
     }
 
     /// Sets the maximum number of bytes to hold in the device's memory: trees, textures and the arrays of a picture. What
@@ -82,14 +83,15 @@ impl GpuRenderer {
     }
 
     /// Returns the bytes of points and triangles that went to the device since it was opened, and the time that this took.
+    /// Waits for a picture that is being rendered, as all methods do that ask for times.
     pub fn upload_time(&self) -> UploadTime {
-        self.state().uploads.time
+        self.state.wait().uploads.time
     }
 
     /// Starts to measure how long each kernel works, if the device has a clock, or stops. Pictures take longer
     /// meanwhile: the device waits until its clock was read.
     pub fn measure_kernels(&self, is_wanted: bool) {
-        let times = &mut self.state().times;
+        let times = &mut self.state.wait().times;
         times.is_measured = is_wanted;
         if is_wanted {
             times.reset();
@@ -98,12 +100,7 @@ impl GpuRenderer {
 
     /// Returns the kernels' names and the work of each that was measured.
     pub fn kernel_times(&self) -> Vec<(String, KernelTime)> {
-        self.state().times.named()
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // A panic elsewhere leaves nothing half done here: kernels and uploads are added when they are complete.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.wait().times.named()
     }
 
     /// Searches along given rays several times, as benchmarks do.
@@ -118,7 +115,7 @@ impl GpuRenderer {
     ) -> surfel_core::Result<RayTimes> {
         self.gpu.check()?;
         ray_timing::check(&self.gpu, timing.geometry, timing.query)?;
-        let mut state = self.state();
+        let mut state = self.state.wait_with(progress)?;
         let State { kernels, uploads, arrays, .. } = &mut *state;
         ray_timing::time(&self.gpu, kernels, (uploads, arrays), timing, progress)
     }
@@ -143,14 +140,14 @@ impl Renderer for GpuRenderer {
         }
         let gpu = &self.gpu;
         gpu.check()?;
-        let mut state = self.state();
-        let passes = Passes::new(scene, settings);
+        let mut state = self.state.wait_with(progress)?;
+        let passes = Passes::new(gpu, scene, settings)?;
         // Pictures have at most 2^28 pixels.
         let n_pixels = region.n_pixels() as u32;
         let (sizes, other_bytes) = state.make_room(gpu, scene, &passes, n_pixels)?;
-        state.upload(gpu, scene, &passes, other_bytes)?;
+        state.upload(gpu, scene, &passes, other_bytes, progress)?;
         let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
-        let words = SceneWords::update(words, gpu, scene)?;
+        let words = SceneWords::update(words, gpu, scene, progress)?;
         let records = SceneRecords::new(scene, &words.offsets);
         let words = &words.buffer;
         let job =
@@ -190,12 +187,13 @@ impl State {
         scene: &FlatScene,
         passes: &Passes,
         other_bytes: u64,
-    ) -> Result<()> {
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         let Self { kernels, uploads, .. } = self;
-        uploads.update(gpu, &scene.geometries, other_bytes)?;
+        uploads.update(gpu, &scene.geometries, other_bytes, progress)?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
-        kernels.compile(gpu, passes.all().map(of_pass))
+        kernels.compile(gpu, passes.all().map(of_pass), progress)
     }
 }
 
@@ -205,8 +203,10 @@ mod tests {
 
     use super::*;
     use crate::test_support::{
-        empty_scene, open_renderer, report_skipped, scene_of_lit_points, scene_of_points,
+        CancelledAfter, empty_scene, open_renderer, report_skipped, scene_of_lit_points,
+        scene_of_points,
     };
+    use std::collections::BTreeSet;
     use surfel_core::Error as CoreError;
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
@@ -229,13 +229,49 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_that_waits_for_another_can_be_cancelled() {
+        let Some(renderer) = open_renderer() else { return };
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let other = renderer.state.wait();
+        let result = renderer.render(&empty_scene(), &settings, &CancelledAfter::new(2));
+        assert_eq!(result.map(|_| ()), Err(CoreError::Cancelled));
+        drop(other);
+        assert!(renderer.render(&empty_scene(), &settings, &NoProgress).is_ok());
+    }
+
+    #[test]
+    fn a_picture_can_be_cancelled_before_each_kernel_and_each_chunk_of_its_upload() {
+        let Some(renderer) = open_renderer() else { return };
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let scene = textured_scene();
+        let render = |n_max| {
+            let progress = CancelledAfter::new(n_max);
+            let result = renderer.render(&scene, &settings, &progress);
+            result.map(|_| progress.n_asked())
+        };
+        for n in 0..3 {
+            assert_eq!(render(n), Err(CoreError::Cancelled));
+            assert_eq!(renderer.upload_time().n_bytes, 0);
+        }
+        let passes = Passes::new(&renderer.gpu, &scene, &settings).unwrap();
+        let kernels: BTreeSet<_> = passes.all().map(|pass| pass.kernel).collect();
+        let trees: BTreeSet<_> = passes.all().filter_map(|pass| pass.tree).collect();
+        // Each tree has a chunk of nodes and one of blocks. The texture and its chunk come last, the turn first.
+        let n = (1 + 2 * trees.len() + kernels.len() + 2) as u32;
+        assert_eq!(render(n - 1), Err(CoreError::Cancelled));
+        // All but the texture has stayed.
+        assert_eq!(render(n), Ok(3));
+        assert_eq!(render(n), Ok(1));
+    }
+
+    #[test]
     fn arrays_of_larger_pictures_are_freed_where_memory_is_short() {
         let Some(renderer) = open_renderer() else { return };
         let small = Settings { width: 8, height: 4, ..Settings::default() };
         let large = Settings { width: 64, height: 64, ..small };
         let render = |renderer: &GpuRenderer, settings: &Settings| {
             renderer.render(&empty_scene(), settings, &NoProgress).map(|_| {
-                let state = renderer.state();
+                let state = renderer.state.wait();
                 state.arrays.as_ref().map(|arrays| arrays.sizes().n_pixels)
             })
         };
@@ -253,8 +289,8 @@ mod tests {
         let settings = Settings { width: 256, height: 128, ..Settings::default() };
         assert!(renderer.render(&scenes[0], &settings, &NoProgress).is_ok());
         let tree_bytes = renderer.upload_time().n_bytes;
-        let sizes = renderer.state().arrays.as_ref().unwrap().sizes();
-        let passes = Passes::new(&scenes[0], &settings);
+        let sizes = renderer.state.wait().arrays.as_ref().unwrap().sizes();
+        let passes = Passes::new(&renderer.gpu, &scenes[0], &settings).unwrap();
         let picture_bytes = Arrays::n_bytes(sizes) + scene_bytes(&scenes[0], &passes);
         // The limit fits a tree and its copy on the way, but no other tree.
         let limit = picture_bytes + 2 * tree_bytes + tree_bytes / 2;
@@ -262,7 +298,7 @@ mod tests {
         let renderer = open_renderer().unwrap().with_memory_limit(Some(limit));
         for scene in [&scenes[0], &scenes[1], &scenes[0]] {
             assert!(renderer.render(scene, &settings, &NoProgress).is_ok());
-            let state = renderer.state();
+            let state = renderer.state.wait();
             assert_eq!(state.arrays.as_ref().unwrap().sizes(), sizes);
         }
         assert_eq!(renderer.upload_time().n_bytes, 3 * tree_bytes);
@@ -292,12 +328,12 @@ mod tests {
         let Some(renderer) = open_renderer() else { return };
         let settings = Settings { width: 8, height: 4, ..Settings::default() };
         assert!(renderer.render(&textured_scene(), &settings, &NoProgress).is_ok());
-        assert!(renderer.state().words.is_some());
+        assert!(renderer.state.wait().words.is_some());
         // The trees of the next scene are refused.
         let limited = renderer.with_memory_limit(Some(1 << 12));
         let next = scene_of_points(SurfaceKind::Disc);
         assert!(limited.render(&next, &settings, &NoProgress).is_err());
-        assert!(limited.state().words.is_none());
+        assert!(limited.state.wait().words.is_none());
     }
 
     #[test]

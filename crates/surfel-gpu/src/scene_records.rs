@@ -13,6 +13,7 @@ use crate::records::{FrameRecord, InstanceRecord, LightRecord, MaterialRecord, T
 use bytemuck::Zeroable;
 use surfel_core::flat::{FlatGeometry, FlatPunctualLight, FlatScene, Instance};
 use surfel_core::math::Vec3;
+use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::{
     AlphaMode, Background, Environment, Lens, Light, Material, PunctualLightKind, Sky, Sun,
@@ -208,14 +209,24 @@ pub fn n_words(scene: &FlatScene) -> usize {
 }
 
 /// Appends the texels, environment maps and colours by support of a scene; returns where each begins.
-pub fn append_words(scene: &FlatScene, words: &mut Vec<u32>) -> WordOffsets {
+///
+/// # Errors
+///
+/// Fails once `progress` is cancelled.
+pub fn append_words(
+    scene: &FlatScene,
+    words: &mut Vec<u32>,
+    progress: &dyn Progress,
+) -> surfel_core::Result<WordOffsets> {
     let mut offsets = WordOffsets::default();
     for texture in &scene.textures {
+        progress.check()?;
         offsets.textures.push(words.len() as u32);
         words.extend(texture.texels.iter().map(|texel| u32::from_le_bytes(*texel)));
     }
     for light in &scene.lights {
         let Light::Environment(environment) = light else { continue };
+        progress.check()?;
         let arrays = environment.arrays();
         offsets.environments.push(words.len() as u32);
         words.extend(arrays.pixels.iter().flat_map(|pixel| pixel.to_array().map(f32::to_bits)));
@@ -239,7 +250,7 @@ pub fn append_words(scene: &FlatScene, words: &mut Vec<u32>) -> WordOffsets {
     }
     debug_assert_eq!(words.len(), n_words(scene));
     words.resize(words.len().max(1), 0);
-    offsets
+    Ok(offsets)
 }
 
 fn material_record(

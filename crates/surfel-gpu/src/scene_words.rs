@@ -7,6 +7,7 @@ use crate::transfer::write;
 use crate::upload::{array, check_array};
 use std::sync::Arc;
 use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::progress::Progress;
 use surfel_core::scene::Light;
 use surfel_core::scene::color::SupportColors;
 
@@ -87,24 +88,25 @@ impl SceneWords {
     ///
     /// # Errors
     ///
-    /// Fails if the device has too little memory.
+    /// Fails if the device has too little memory, or once `progress` is cancelled.
     pub fn update<'a>(
         known: &'a mut Option<Self>,
         gpu: &Gpu,
         scene: &FlatScene,
-    ) -> Result<&'a Self> {
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<&'a Self> {
         let words = match known.take() {
             Some(words) => words,
-            None => Self::new(gpu, scene)?,
+            None => Self::new(gpu, scene, progress)?,
         };
         Ok(known.insert(words))
     }
 
-    fn new(gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+    fn new(gpu: &Gpu, scene: &FlatScene, progress: &dyn Progress) -> surfel_core::Result<Self> {
         let mut words = Vec::new();
-        let offsets = append_words(scene, &mut words);
+        let offsets = append_words(scene, &mut words, progress)?;
         let buffer = array(gpu, "textures", 4 * words.len())?;
-        write(gpu, &buffer, bytemuck::cast_slice(&words))?;
+        write(gpu, &buffer, bytemuck::cast_slice(&words), progress)?;
         Ok(Self { source: Source::new(scene), buffer, offsets })
     }
 }

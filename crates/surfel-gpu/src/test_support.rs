@@ -3,10 +3,11 @@
 use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::renderer::GpuRenderer;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use surfel_core::flat::FlatScene;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Preparation, StructureChoice, prepare};
-use surfel_core::progress::NoProgress;
+use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::{
     Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
 };
@@ -38,6 +39,36 @@ fn found<T>(open: impl FnOnce(Option<&str>) -> Result<T>) -> Option<T> {
 #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
 pub fn report_skipped(reason: &str) {
     println!("skipped: {reason}");
+}
+
+/// Counts how often the work asks whether to stop before its first stage, and cancels it there after `n_max` times.
+pub struct CancelledAfter {
+    n_max: u32,
+    n_asked: AtomicU32,
+    has_begun: AtomicBool,
+}
+
+impl CancelledAfter {
+    /// Lets the work ask `n_max` times.
+    pub fn new(n_max: u32) -> Self {
+        Self { n_max, n_asked: AtomicU32::new(0), has_begun: AtomicBool::new(false) }
+    }
+
+    /// Returns how often the work has asked.
+    pub fn n_asked(&self) -> u32 {
+        self.n_asked.load(Ordering::Relaxed)
+    }
+}
+
+impl Progress for CancelledAfter {
+    fn begin(&self, _: &str, _: u64) {
+        self.has_begun.store(true, Ordering::Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        !self.has_begun.load(Ordering::Relaxed)
+            && self.n_max <= self.n_asked.fetch_add(1, Ordering::Relaxed)
+    }
 }
 
 /// Returns a scene of nothing but a camera.

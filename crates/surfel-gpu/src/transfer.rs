@@ -1,13 +1,11 @@
-//! The transfer of nodes and bytes to arrays of a device, chunk by chunk.
+//! The transfer of payloads to arrays of a device, chunk by chunk.
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::numbers::{NODE_VECTORS, VECTOR_BYTES};
+use crate::payload::{Part, Payload};
 use crate::threads::for_each;
-use surfel_core::bvh::BvhNode;
+use surfel_core::progress::Progress;
 
-/// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
-pub const NODE_BYTES: usize = VECTOR_BYTES * NODE_VECTORS;
 /// Bytes of a chunk.
 const CHUNK_BYTES: usize = 1 << 24;
 /// Maximum number of bytes on their way to the device: one chunk is filled while the device copies the one before.
@@ -15,73 +13,49 @@ pub const MAX_STAGING_BYTES: usize = 2 * CHUNK_BYTES;
 /// Bytes of a piece of a chunk: for one, a thread is worth its start, which takes some ten microseconds.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// The contents of an array: nodes, each padded to `NODE_BYTES`, and bytes behind them.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Payload<'a> {
-    /// The nodes.
-    pub nodes: &'a [BvhNode],
-    /// The bytes behind them.
-    pub bytes: &'a [u8],
-}
-
-impl Payload<'_> {
-    /// Returns the number of bytes.
-    pub fn len(&self) -> usize {
-        self.nodes.len() * NODE_BYTES + self.bytes.len()
-    }
-
-    /// Copies bytes from `offset` on, as many as `target` holds.
-    fn copy(&self, mut offset: usize, mut target: wgpu::WriteOnly<[u8]>) {
-        let first_byte = self.nodes.len() * NODE_BYTES;
-        while offset < first_byte && !target.is_empty() {
-            let (node_idx, skipped) = (offset / NODE_BYTES, offset % NODE_BYTES);
-            let mut padded = [0; NODE_BYTES];
-            padded[..size_of::<BvhNode>()]
-                .copy_from_slice(bytemuck::bytes_of(&self.nodes[node_idx]));
-            let n = (NODE_BYTES - skipped).min(target.len());
-            let (mut part, rest) = target.split_at(n);
-            part.copy_from_slice(&padded[skipped..skipped + n]);
-            (offset, target) = (offset + n, rest);
-        }
-        let start = offset.saturating_sub(first_byte);
-        let n = target.len();
-        target.copy_from_slice(&self.bytes[start..start + n]);
-    }
-
-    /// Copies bytes from `offset` on in several threads.
-    fn copy_in_parallel(&self, offset: usize, target: wgpu::WriteOnly<[u8]>) {
-        let (pieces, rest) = target.into_chunks::<PIECE_BYTES>();
-        let pieces: Vec<_> = pieces.into_iter().enumerate().collect();
-        let end = offset + pieces.len() * PIECE_BYTES;
-        for_each(pieces, |(i, piece)| self.copy(offset + i * PIECE_BYTES, piece.into()));
-        self.copy(end, rest);
-    }
+/// Copies bytes of a payload from `offset` on in several threads.
+fn copy_in_parallel(payload: &Payload, offset: usize, target: wgpu::WriteOnly<[u8]>) {
+    let (pieces, rest) = target.into_chunks::<PIECE_BYTES>();
+    let pieces: Vec<_> = pieces.into_iter().enumerate().collect();
+    let end = offset + pieces.len() * PIECE_BYTES;
+    for_each(pieces, |(i, piece)| payload.copy(offset + i * PIECE_BYTES, piece.into()));
+    payload.copy(end, rest);
 }
 
 /// A transfer of which at most two chunks are on their way.
-#[derive(Debug)]
 pub struct Transfer<'a> {
     gpu: &'a Gpu,
+    progress: &'a dyn Progress,
     /// The chunk that the device copies.
     in_flight: Option<wgpu::SubmissionIndex>,
 }
 
 impl<'a> Transfer<'a> {
     /// Makes a transfer of nothing yet.
-    pub fn new(gpu: &'a Gpu) -> Self {
-        Self { gpu, in_flight: None }
+    pub fn new(gpu: &'a Gpu, progress: &'a dyn Progress) -> Self {
+        Self { gpu, progress, in_flight: None }
     }
 
     /// Fills an array with the bytes from `start` on.
-    pub fn fill(&mut self, buffer: &wgpu::Buffer, payload: Payload, start: usize) -> Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// Fails if the device does, or once `progress` is cancelled.
+    pub fn fill(
+        &mut self,
+        buffer: &wgpu::Buffer,
+        payload: &Payload,
+        start: usize,
+    ) -> surfel_core::Result<()> {
         let size = buffer.size() as usize;
         for offset in (0..size).step_by(CHUNK_BYTES) {
+            self.progress.check()?;
             let n_bytes = CHUNK_BYTES.min(size - offset);
             let submitted = self.gpu.catch("points", || {
                 let n_bytes = wgpu::BufferSize::new(n_bytes as u64)?;
                 let queue = &self.gpu.queue;
                 let mut staging = queue.write_buffer_with(buffer, offset as u64, n_bytes)?;
-                payload.copy_in_parallel(start + offset, staging.slice(..));
+                copy_in_parallel(payload, start + offset, staging.slice(..));
                 drop(staging);
                 Some(queue.submit([]))
             })?;
@@ -106,10 +80,19 @@ impl<'a> Transfer<'a> {
 }
 
 /// Fills an array.
-pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-    let mut transfer = Transfer::new(gpu);
-    transfer.fill(buffer, Payload { bytes, ..Payload::default() }, 0)?;
-    transfer.finish()
+///
+/// # Errors
+///
+/// Fails if the device does, or once `progress` is cancelled.
+pub fn write(
+    gpu: &Gpu,
+    buffer: &wgpu::Buffer,
+    bytes: &[u8],
+    progress: &dyn Progress,
+) -> surfel_core::Result<()> {
+    let mut transfer = Transfer::new(gpu, progress);
+    transfer.fill(buffer, &Payload(vec![Part::Bytes(bytes)]), 0)?;
+    Ok(transfer.finish()?)
 }
 
 #[cfg(test)]
@@ -117,9 +100,12 @@ mod tests {
     //! Bytes arrive as they were sent, also in arrays that begin amid a node.
 
     use super::*;
-    use crate::test_support::open_gpu;
+    use crate::numbers::{NODE_VECTORS, VECTOR_BYTES};
+    use crate::test_support::{CancelledAfter, open_gpu};
     use bytemuck::Zeroable;
     use std::sync::mpsc;
+    use surfel_core::bvh::BvhNode;
+    use surfel_core::progress::NoProgress;
     use wgpu::BufferUsages as Usage;
 
     fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<u8> {
@@ -137,6 +123,7 @@ mod tests {
 
     #[test]
     fn arrays_hold_what_was_sent() {
+        const NODE_BYTES: usize = VECTOR_BYTES * NODE_VECTORS;
         let Some(gpu) = open_gpu() else { return };
         let node = |i: u32| {
             let mut node = BvhNode::zeroed();
@@ -152,15 +139,15 @@ mod tests {
             expected.resize(expected.len().next_multiple_of(NODE_BYTES), 0);
         }
         expected.extend_from_slice(&bytes);
-        let payload = Payload { nodes: &nodes, bytes: &bytes };
+        let payload = Payload(vec![Part::nodes(nodes.len(), |i| nodes[i]), Part::Bytes(&bytes)]);
         assert_eq!(payload.len(), expected.len());
         // The second array begins amid a node, the third one amid the bytes.
         let starts = [0, 16 * 1001, 400_000 * NODE_BYTES + 32];
-        let mut transfer = Transfer::new(&gpu);
+        let mut transfer = Transfer::new(&gpu, &NoProgress);
         let usage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         let arrays = starts.map(|start| {
             let buffer = gpu.buffer("test", (expected.len() - start) as u64, usage).unwrap();
-            transfer.fill(&buffer, payload, start).unwrap();
+            transfer.fill(&buffer, &payload, start).unwrap();
             buffer
         });
         transfer.finish().unwrap();
@@ -176,8 +163,21 @@ mod tests {
         let usage = Usage::STORAGE | Usage::COPY_DST;
         let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
         gpu.device.destroy();
-        let error = write(&gpu, &buffer, &bytes).unwrap_err();
-        assert!(error.to_string().starts_with(&gpu.info.name), "{error}");
+        let error = write(&gpu, &buffer, &bytes, &NoProgress).unwrap_err();
+        assert!(error.to_string().contains(&gpu.info.name), "{error}");
         assert!(gpu.check().is_err());
+    }
+
+    #[test]
+    fn a_transfer_is_cancelled_between_chunks() {
+        let Some(gpu) = open_gpu() else { return };
+        let bytes = vec![0; 3 * CHUNK_BYTES];
+        let usage = Usage::STORAGE | Usage::COPY_DST;
+        let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
+        let write = |n| write(&gpu, &buffer, &bytes, &CancelledAfter::new(n));
+        for n in 0..3 {
+            assert_eq!(write(n), Err(surfel_core::Error::Cancelled));
+        }
+        assert_eq!(write(3), Ok(()));
     }
 }

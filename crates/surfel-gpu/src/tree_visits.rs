@@ -91,11 +91,12 @@ impl TreeVisits {
         let first = self.visits.len() as u32;
         for (instance_idx, instance) in scene.instances.iter().enumerate() {
             let geometry_idx = instance.geometry_idx as usize;
-            let range = ranges.iter().find(|range| range.geometry_idx == geometry_idx);
-            let (Some(range), FlatGeometry::Cloud(cloud)) = (range, scene.geometry(instance))
-            else {
+            // They are in the order of the geometries.
+            let range = ranges.binary_search_by_key(&geometry_idx, |range| range.geometry_idx);
+            let (Ok(range), FlatGeometry::Cloud(cloud)) = (range, scene.geometry(instance)) else {
                 continue;
             };
+            let range = &ranges[range];
             self.visits.push(Visit {
                 root_node: range.root_node,
                 first_vector: range.first_vector,

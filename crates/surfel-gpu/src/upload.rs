@@ -2,17 +2,20 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::field_arrays::{structure, structure_vectors};
-use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
+use crate::field_arrays::structure;
+use crate::gaussian_arrays::{gaussian_blocks, gaussian_clouds, gaussian_nodes};
 use crate::kernels::{Kernels, bind};
-use crate::mesh_blocks::{block_vectors, mesh_blocks};
-use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES};
-use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
+use crate::mesh_blocks::mesh_blocks;
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::payload::{Part, Payload};
+use crate::transfer::{MAX_STAGING_BYTES, Transfer};
 use crate::unsupported::trees;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
-use surfel_core::flat::{BlockTree, FlatGeometry};
+use surfel_core::flat::FlatGeometry;
+use surfel_core::progress::Progress;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -71,7 +74,8 @@ pub type GpuGeometry = [Option<GpuTree>; 3];
 /// The geometries that are in a device's memory.
 #[derive(Debug, Default)]
 pub struct Uploads {
-    geometries: Vec<(Weak<FlatGeometry>, GpuGeometry)>,
+    /// The geometries by their addresses.
+    geometries: BTreeMap<usize, (Weak<FlatGeometry>, GpuGeometry)>,
     /// The trained Gaussians of these geometries in one tree.
     gaussians: Option<(Vec<Weak<FlatGeometry>>, GpuTree)>,
     /// The work so far.
@@ -100,23 +104,27 @@ impl Uploads {
     ///
     /// # Errors
     ///
-    /// Fails if a geometry is too large for the device, before anything is uploaded.
+    /// Fails if a geometry is too large for the device, before anything is uploaded, or once `progress` is cancelled. What
+    /// was uploaded then stays.
     pub fn update(
         &mut self,
         gpu: &Gpu,
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
-    ) -> Result<()> {
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         self.make_room(gpu, geometries, other_bytes)?;
         for geometry in geometries {
-            if self.position(geometry).is_none() {
+            if self.get(geometry).is_none() {
                 let start = Instant::now();
-                let uploaded = upload(gpu, geometry)?;
+                let uploaded = upload(gpu, geometry, progress)?;
                 self.time.add(start, uploaded.iter().flatten());
-                self.geometries.push((Arc::downgrade(geometry), uploaded));
+                // A weak reference keeps its address from being used again.
+                let uploaded = (Arc::downgrade(geometry), uploaded);
+                self.geometries.insert(address(geometry), uploaded);
             }
         }
-        self.update_gaussians(gpu, geometries)
+        self.update_gaussians(gpu, geometries, progress)
     }
 
     /// Frees geometries that are no longer in use, and those of other pictures if these and `other_bytes` need their memory.
@@ -131,13 +139,13 @@ impl Uploads {
         other_bytes: u64,
     ) -> Result<()> {
         // A geometry that was changed has lost its weak references.
-        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+        self.geometries.retain(|_, (geometry, _)| geometry.strong_count() != 0);
         if !self.has_gaussians_of(geometries) {
             self.gaussians = None;
         }
         if self.check_memory(gpu, geometries, other_bytes).is_err() {
-            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
-            self.geometries.retain(|(known, _)| is_needed(known));
+            let needed: BTreeSet<usize> = geometries.iter().map(address).collect();
+            self.geometries.retain(|known, _| needed.contains(known));
         }
         self.check_memory(gpu, geometries, other_bytes)
     }
@@ -149,35 +157,38 @@ impl Uploads {
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
     ) -> Result<()> {
-        let mut missing = Vec::new();
-        for (i, geometry) in geometries.iter().enumerate() {
-            let is_repeated = geometries[..i].iter().any(|other| Arc::ptr_eq(other, geometry));
-            if !is_repeated && self.position(geometry).is_none() {
-                missing.extend(geometry_sizes(geometry));
+        let (mut missing, mut seen) = (Vec::new(), BTreeSet::new());
+        for geometry in geometries {
+            if self.get(geometry).is_none() && seen.insert(address(geometry)) {
+                missing.extend(tree_contents(geometry));
             }
         }
         if self.gaussians.is_none() {
-            missing.push(gaussian_size(geometries));
+            missing.push(gaussian_contents(geometries));
         }
-        for size in &missing {
-            check_pages(gpu, size.node_bytes, N_NODE_PAGES)?;
-            check_pages(gpu, size.block_bytes, N_BLOCK_PAGES)?;
+        for tree in &missing {
+            check_pages(gpu, tree.nodes.len(), N_NODE_PAGES)?;
+            check_pages(gpu, tree.blocks.len(), N_BLOCK_PAGES)?;
         }
-        let trees = self.geometries.iter().flat_map(|(_, trees)| trees.iter().flatten());
+        let trees = self.geometries.values().flat_map(|(_, trees)| trees.iter().flatten());
         let held = trees.chain(self.gaussians.as_ref().map(|(_, tree)| tree)).map(GpuTree::n_bytes);
-        let missing: usize = missing.iter().map(|size| size.node_bytes + size.block_bytes).sum();
+        let missing: usize = missing.iter().map(TreeContents::len).sum();
         let staging = missing.min(MAX_STAGING_BYTES);
         gpu.check_memory(held.sum::<u64>() + (missing + staging) as u64 + other_bytes)
     }
 
     /// Uploads the trained Gaussians of all geometries in one tree, unless they are there.
-    fn update_gaussians(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
+    fn update_gaussians(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<()> {
         if self.gaussians.is_some() || gaussian_clouds(geometries).next().is_none() {
             return Ok(());
         }
         let start = Instant::now();
-        let arrays = GaussianArrays::new(geometries);
-        if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
+        if let Some(tree) = upload_tree(gpu, &gaussian_contents(geometries), progress)? {
             self.time.add(start, [&tree]);
             let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
             self.gaussians = Some((clouds.collect(), tree));
@@ -206,12 +217,12 @@ impl Uploads {
 
     /// Returns a geometry that is uploaded.
     pub fn get(&self, geometry: &Arc<FlatGeometry>) -> Option<&GpuGeometry> {
-        self.position(geometry).map(|i| &self.geometries[i].1)
+        self.geometries.get(&address(geometry)).map(|(_, trees)| trees)
     }
+}
 
-    fn position(&self, geometry: &Arc<FlatGeometry>) -> Option<usize> {
-        self.geometries.iter().position(|(known, _)| is_same(known, geometry))
-    }
+fn address(geometry: &Arc<FlatGeometry>) -> usize {
+    Arc::as_ptr(geometry) as usize
 }
 
 /// Returns true if a weak reference is one to this geometry, as it was then.
@@ -220,79 +231,71 @@ pub fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool
     known.as_ptr() == Arc::as_ptr(geometry)
 }
 
-/// The bytes of the arrays of a tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct TreeSize {
-    /// Bytes of the nodes, and of a structure behind them.
-    node_bytes: usize,
-    block_bytes: usize,
+/// The contents of the arrays of a tree.
+#[derive(Default)]
+struct TreeContents<'a> {
+    /// The nodes, and a structure behind them.
+    nodes: Payload<'a>,
+    blocks: Payload<'a>,
 }
 
-/// Returns the sizes of the trees of a geometry.
-fn geometry_sizes(geometry: &FlatGeometry) -> [TreeSize; 3] {
+impl TreeContents<'_> {
+    /// Returns the number of bytes.
+    fn len(&self) -> usize {
+        self.nodes.len() + self.blocks.len()
+    }
+}
+
+/// Returns the contents of a tree with these nodes and blocks.
+fn tree<'a>(nodes: &'a [BvhNode], blocks: Part<'a>) -> TreeContents<'a> {
+    let nodes = Part::nodes(nodes.len(), move |i| nodes[i]);
+    TreeContents { nodes: Payload(vec![nodes]), blocks: Payload(vec![blocks]) }
+}
+
+/// Returns the contents of the trees of a geometry.
+fn tree_contents(geometry: &FlatGeometry) -> [TreeContents<'_>; 3] {
     match geometry {
         FlatGeometry::Cloud(cloud) => {
-            let mut sizes = trees(cloud).map(|(_, points)| TreeSize {
-                node_bytes: points.nodes.len() * NODE_BYTES,
-                block_bytes: size_of_val(points.blocks.as_slice()),
+            let mut found = trees(cloud).map(|(_, points)| {
+                tree(&points.nodes, Part::Bytes(bytemuck::cast_slice(&points.blocks)))
             });
-            sizes[0].node_bytes += VECTOR_BYTES * structure_vectors(cloud);
-            sizes
+            found[0].nodes.0.extend(structure(cloud));
+            found
         }
         FlatGeometry::Mesh(mesh) => {
-            let n_vectors = mesh.triangles.blocks.len() * block_vectors(mesh) as usize;
-            let node_bytes = mesh.triangles.nodes.len() * NODE_BYTES;
-            let size = TreeSize { node_bytes, block_bytes: VECTOR_BYTES * n_vectors };
-            [size, TreeSize::default(), TreeSize::default()]
+            let tree = tree(&mesh.triangles.nodes, mesh_blocks(mesh));
+            [tree, TreeContents::default(), TreeContents::default()]
         }
     }
 }
 
-/// Returns the size of the tree of all trained Gaussians.
-fn gaussian_size(geometries: &[Arc<FlatGeometry>]) -> TreeSize {
-    let mut size = TreeSize::default();
-    for (_, gaussians) in gaussian_clouds(geometries) {
-        size.node_bytes += gaussians.nodes().len() * NODE_BYTES;
-        size.block_bytes += size_of_val(gaussians.blocks());
-        size.block_bytes += size_of_val(gaussians.coefficient_bits());
-    }
-    size
+/// Returns the contents of the tree of all trained Gaussians.
+fn gaussian_contents(geometries: &[Arc<FlatGeometry>]) -> TreeContents<'_> {
+    TreeContents { nodes: gaussian_nodes(geometries), blocks: gaussian_blocks(geometries) }
 }
 
-fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
-    let cloud = match geometry {
-        FlatGeometry::Cloud(cloud) => cloud,
-        FlatGeometry::Mesh(mesh) => {
-            let blocks = mesh_blocks(mesh);
-            let tree = upload_tree(gpu, &mesh.triangles.nodes, &[], bytemuck::cast_slice(&blocks));
-            return Ok([tree?, None, None]);
-        }
-    };
-    let structure = structure(cloud);
-    let tree = |tree_idx: usize| {
-        let (_, points) = trees(cloud)[tree_idx];
-        let behind_nodes: &[[u32; 4]] = if tree_idx == 0 { &structure } else { &[] };
-        let blocks = bytemuck::cast_slice(&points.blocks);
-        upload_tree(gpu, &points.nodes, bytemuck::cast_slice(behind_nodes), blocks)
-    };
-    Ok([tree(0)?, tree(1)?, tree(2)?])
+fn upload(
+    gpu: &Gpu,
+    geometry: &FlatGeometry,
+    progress: &dyn Progress,
+) -> surfel_core::Result<GpuGeometry> {
+    let [first, second, third] = tree_contents(geometry);
+    let tree = |contents| upload_tree(gpu, &contents, progress);
+    Ok([tree(first)?, tree(second)?, tree(third)?])
 }
 
-/// Uploads a tree, with the bytes of a structure behind its nodes.
+/// Uploads a tree, if it is not empty.
 fn upload_tree(
     gpu: &Gpu,
-    tree_nodes: &[BvhNode],
-    behind_nodes: &[u8],
-    tree_blocks: &[u8],
-) -> Result<Option<GpuTree>> {
-    if tree_nodes.is_empty() {
+    tree: &TreeContents,
+    progress: &dyn Progress,
+) -> surfel_core::Result<Option<GpuTree>> {
+    if tree.blocks.len() == 0 {
         return Ok(None);
     }
-    let mut transfer = Transfer::new(gpu);
-    let payload = Payload { nodes: tree_nodes, bytes: behind_nodes };
-    let nodes = pages(&mut transfer, gpu, "nodes", payload)?;
-    let payload = Payload { nodes: &[], bytes: tree_blocks };
-    let blocks = pages(&mut transfer, gpu, "blocks", payload)?;
+    let mut transfer = Transfer::new(gpu, progress);
+    let nodes = pages(&mut transfer, gpu, "nodes", &tree.nodes)?;
+    let blocks = pages(&mut transfer, gpu, "blocks", &tree.blocks)?;
     transfer.finish()?;
     Ok(Some(GpuTree { nodes, blocks }))
 }
@@ -302,8 +305,8 @@ fn pages(
     transfer: &mut Transfer,
     gpu: &Gpu,
     label: &'static str,
-    payload: Payload,
-) -> Result<Vec<wgpu::Buffer>> {
+    payload: &Payload,
+) -> surfel_core::Result<Vec<wgpu::Buffer>> {
     let n_bytes = payload.len();
     let page = |start: usize| {
         let buffer = array(gpu, label, gpu.page_bytes().min(n_bytes - start))?;
@@ -339,4 +342,36 @@ pub fn check_array(gpu: &Gpu, n_bytes: usize) -> Result<()> {
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! A geometry counts once, however often a scene has it.
+
+    use super::*;
+    use crate::test_support::{open_gpu, scene_of_points};
+    use surfel_core::progress::NoProgress;
+    use surfel_core::surface::SurfaceKind;
+
+    #[test]
+    fn a_geometry_that_a_scene_repeats_counts_once() {
+        let Some(mut gpu) = open_gpu() else { return };
+        let geometry = || Arc::clone(&scene_of_points(SurfaceKind::Disc).geometries[0]);
+        let (first, second) = (geometry(), geometry());
+        let trees = [&first, &second].map(|geometry| tree_contents(geometry));
+        let n_bytes = trees.iter().flatten().map(TreeContents::len).sum::<usize>() as u64;
+        let geometries = [&first, &second, &first, &second].map(Arc::clone);
+        let mut uploads = Uploads::default();
+        // Before the upload as many bytes are on their way.
+        gpu.memory_limit = Some(2 * n_bytes);
+        assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
+        assert!(uploads.check_memory(&gpu, &geometries, 1).is_err());
+        uploads.update(&gpu, &geometries, 0, &NoProgress).unwrap();
+        assert_eq!(uploads.time.n_bytes, n_bytes);
+        gpu.memory_limit = Some(n_bytes);
+        assert!(uploads.check_memory(&gpu, &geometries, 0).is_ok());
+        // Those of other pictures make room.
+        assert!(uploads.make_room(&gpu, &geometries[..1], 1).is_ok());
+        assert!(uploads.get(&first).is_some() && uploads.get(&second).is_none());
+    }
 }
