@@ -36,6 +36,11 @@ impl Subject {
         self.cloud.len()
     }
 
+    /// Returns the world coordinates of the zero of the positions.
+    pub fn origin(&self) -> DVec3 {
+        self.cloud.origin
+    }
+
     /// Returns a grey geometry of a kind, without normals if the kind needs none.
     pub fn geometry(&self, kind: SurfaceKind) -> CloudGeometry {
         let mut cloud = self.cloud.clone().into_inner();

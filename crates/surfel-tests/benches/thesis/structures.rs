@@ -4,7 +4,7 @@ use super::clouds;
 use rayon::prelude::*;
 use std::time::Instant;
 use surfel_core::flat::{FieldTree, FlatCloud};
-use surfel_core::math::{DVec3, Ray};
+use surfel_core::math::Ray;
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_core::trace::{Counted, Simd, SurfaceHit, surface_hits, take_counts};
@@ -25,7 +25,7 @@ pub fn print_structures() {
         let mut flat =
             FlatCloud::new(&subject.geometry(SurfaceKind::Implicit), &NoProgress).unwrap();
         flat.edge_test = EdgeTest::Off;
-        let view = subject.camera.view(DVec3::ZERO, RESOLUTION, RESOLUTION);
+        let view = subject.camera.view(subject.origin(), RESOLUTION, RESOLUTION);
         let pixels = (0..RESOLUTION * RESOLUTION).map(|i| (i % RESOLUTION, i / RESOLUTION));
         let rays: Vec<Ray> =
             pixels.map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
