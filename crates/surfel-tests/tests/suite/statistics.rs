@@ -172,14 +172,15 @@ fn soft_shadows_of_a_lamp_have_their_mean() {
     let mut scene = floor_scene(Vec::new());
     let transform = Transform::Matrix(DAffine3::from_translation(position_of_lamp));
     scene.graph.nodes.push(Node { light: Some(light), transform, ..Node::new("light") });
-    // The light is a disc that faces the shaded point and emits the same radiance everywhere.
+    // The light is a ball that emits the same radiance everywhere: 16 over its area as a disc.
     check("punctual light", &scene, N_RUNS, 0.0, |position, _| {
-        let frame = frame((position_of_lamp - position).normalize());
+        let to_center = position_of_lamp - position;
+        let frame = frame(to_center.normalize());
+        let cos_max = (1.0 - radius * radius / to_center.length_squared()).sqrt();
         let light = |(u, v): (f64, f64)| {
-            let (x, y) = (u.sqrt() * (TAU * v).cos(), u.sqrt() * (TAU * v).sin());
-            let to_light = position_of_lamp + radius * (x * frame[0] + y * frame[1]) - position;
-            let is_open = is_open(position, to_light.normalize(), to_light.z);
-            if is_open { 16.0 * to_light.z / to_light.length().powi(3) } else { 0.0 }
+            let toward = direction(&frame, 1.0 - u * (1.0 - cos_max), TAU * v);
+            let radiance = 16.0 * 2.0 * (1.0 - cos_max) / (radius * radius);
+            if is_open(position, toward, to_center.z) { radiance * toward.z } else { 0.0 }
         };
         cells(200).map(light).sum::<f64>() / 200f64.powi(2)
     });
