@@ -1,6 +1,8 @@
 //! Access control: a token beyond loopback, and checks that keep foreign web pages out.
 
 use crate::frame_ancestors::FrameAncestors;
+use crate::random_name::random_name;
+use crate::scene_provider::Error;
 use axum::http::header::{AUTHORIZATION, COOKIE, HOST, HeaderName, ORIGIN, REFERER};
 use axum::http::{HeaderMap, HeaderValue, Method, Request, Uri};
 use std::net::IpAddr;
@@ -79,8 +81,6 @@ enum Sender {
     Unstated,
 }
 
-/// Number of random bytes in a token.
-const TOKEN_BYTES: usize = 16;
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl AccessGuard {
@@ -89,15 +89,12 @@ impl AccessGuard {
     /// # Errors
     ///
     /// Fails if the system has no random numbers.
-    pub fn new(host: IpAddr) -> Result<Self, getrandom::Error> {
+    pub fn new(host: IpAddr) -> Result<Self, Error> {
         let (scheme, frame_ancestors) = (Scheme::Http, FrameAncestors::default());
         if host.is_loopback() {
             return Ok(Self { scheme, frame_ancestors, token: None });
         }
-        let mut bytes = [0; TOKEN_BYTES];
-        getrandom::fill(&mut bytes)?;
-        let token = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { scheme, frame_ancestors, token: Some(token) })
+        Ok(Self { scheme, frame_ancestors, token: Some(random_name()?) })
     }
 
     /// The token that requests need; none on loopback.

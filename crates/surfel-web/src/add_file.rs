@@ -36,11 +36,8 @@ pub async fn run(
     out: &mpsc::Sender<Outgoing>,
 ) -> Result<Value> {
     let Announcement { id, name, n_bytes } = announced;
-    let (taken, max_files) = (files.names(), state.limits.max_page_files);
-    if max_files <= taken.len() {
-        let text = format!("a page can add {max_files} files; those that it removes count too");
-        return Err(Error::invalid_request(text));
-    }
+    let max_files = state.limits.max_page_files;
+    files.names_if_below(max_files)?;
     let mut reservation = state.uploads.reserve(&name, n_bytes)?;
     let upload = state.uploads.expect(n_bytes)?;
     let file_id = upload.name.clone();
@@ -49,13 +46,19 @@ pub async fn run(
     let bytes = received(state, upload, &is_cancelled, out).await?;
     let bytes =
         bytes.ok_or_else(|| Error::invalid_request(format!("{name} did not arrive whole")))?;
+    // One file is read at a time, so that it gets a name that no other one has.
+    let _turn = files.turn.lock().await;
+    let taken = files.names_if_below(max_files)?;
     let (sent_id, sent_name) = (file_id.clone(), name.clone());
     let max_bytes = state.limits.max_added_file_bytes;
     let read = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
         let (id, name, bytes, taken) = (&sent_id[..], &sent_name[..], &bytes[..], &taken[..]);
-        provider.read_added_file(&SentFile { id, name, bytes, taken, max_bytes }, progress)
+        let file = SentFile { id, name, bytes, taken, max_bytes };
+        // While a file is read there are its bytes and its content.
+        reservation.add_content(name, provider.stated_bytes(&file)?)?;
+        Ok((provider.read_added_file(&file, progress)?, reservation))
     };
-    let file = run_at_once(state, id, is_cancelled, out, read).await?;
+    let (file, mut reservation) = run_at_once(state, id, is_cancelled, out, read).await?;
     reservation.resize(&name, file.n_bytes())?;
     let mut message = json!({ "type": "added", "id": id, "file": file.description() });
     message["file"]["id"] = json!(file_id);

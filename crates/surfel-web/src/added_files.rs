@@ -1,17 +1,17 @@
 //! Files that pages add to their views: the memory that they may take, and their bytes on the way to the server.
 
 use crate::limits::Limits;
+use crate::lock::lock;
+use crate::random_name::random_name;
 use crate::scene_provider::{AddedFile, Error, Result};
 use axum::body::Body;
 use futures_util::StreamExt;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
-/// Number of random bytes in the name of an upload.
-const NAME_BYTES: usize = 16;
 /// Least number of bytes a second, on the whole, with which a file must arrive.
 const MIN_BYTES_PER_SEC: u64 = 1 << 14;
 /// Maximum number of characters of a file's name.
@@ -95,10 +95,7 @@ impl FileUploads {
     ///
     /// Fails if the system has no random numbers.
     pub fn expect(self: &Arc<Self>, n_bytes: u64) -> Result<UploadGuard> {
-        let mut bytes = [0; NAME_BYTES];
-        let text = "the system has no random numbers";
-        getrandom::fill(&mut bytes).map_err(|_| Error::invalid_request(text))?;
-        let name: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let name = random_name()?;
         let (sender, receiver) = oneshot::channel();
         lock(&self.expected).insert(name.clone(), Upload { n_bytes, sender });
         Ok(UploadGuard { uploads: self.clone(), name, receiver })
@@ -162,12 +159,27 @@ impl Reservation {
     ///
     /// Fails beyond the limits; the reservation then stays as it was.
     pub fn resize(&mut self, name: &str, n_bytes: u64) -> Result<()> {
-        let (max_file, max_all) = (self.uploads.max_file_bytes, self.uploads.max_bytes);
+        let max_file = self.uploads.max_file_bytes;
         if max_file < n_bytes {
             let (found, limit) = (mebibytes(n_bytes), mebibytes(max_file));
             let text = format!("{name} takes {found}, expected at most {limit}");
             return Err(Error::invalid_request(text));
         }
+        self.set(name, n_bytes)
+    }
+
+    /// Reserves memory for the content of a file beside that for its bytes.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the files of all pages leave too little; the reservation then stays as it was.
+    pub fn add_content(&mut self, name: &str, n_bytes: u64) -> Result<()> {
+        // Content beyond the limit is refused with the reason when it is read.
+        self.set(name, self.n_bytes + n_bytes.min(self.uploads.max_file_bytes))
+    }
+
+    fn set(&mut self, name: &str, n_bytes: u64) -> Result<()> {
+        let max_all = self.uploads.max_bytes;
         let mut n_reserved = lock(&self.uploads.n_reserved);
         let n_others = *n_reserved - self.n_bytes;
         if max_all < n_others + n_bytes {
@@ -192,17 +204,30 @@ impl Drop for Reservation {
 
 /// The files that one page has added. They are kept until it goes, so that their removal can be undone.
 #[derive(Default)]
-pub struct PageFiles(Mutex<Vec<(Arc<dyn AddedFile>, Reservation)>>);
+pub struct PageFiles {
+    kept: Mutex<Vec<(Arc<dyn AddedFile>, Reservation)>>,
+    /// Held while a file is read and kept.
+    pub turn: tokio::sync::Mutex<()>,
+}
 
 impl PageFiles {
     /// Returns the names of the files.
-    pub fn names(&self) -> Vec<String> {
-        lock(&self.0).iter().map(|(file, _)| file.name().to_owned()).collect()
+    ///
+    /// # Errors
+    ///
+    /// Fails if there are `max_files`.
+    pub fn names_if_below(&self, max_files: usize) -> Result<Vec<String>> {
+        let kept = lock(&self.kept);
+        if max_files <= kept.len() {
+            let text = format!("a page can add {max_files} files; those that it removes count too");
+            return Err(Error::invalid_request(text));
+        }
+        Ok(kept.iter().map(|(file, _)| file.name().to_owned()).collect())
     }
 
     /// Keeps a file and its memory.
     pub fn keep(&self, file: Arc<dyn AddedFile>, reservation: Reservation) {
-        lock(&self.0).push((file, reservation));
+        lock(&self.kept).push((file, reservation));
     }
 }
 
@@ -212,10 +237,6 @@ fn mebibytes(n_bytes: u64) -> String {
         few if few < 10.0 => format!("{few:.1} MiB"),
         many => format!("{many:.0} MiB"),
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -244,6 +265,9 @@ mod tests {
         assert!(second.resize("b", 101).is_err());
         second.resize("b", 20).unwrap();
         assert!(uploads.reserve("d", 81).is_err());
+        assert!(second.add_content("b", 81).is_err());
+        second.add_content("b", 60).unwrap();
+        assert!(uploads.reserve("d", 21).is_err());
         drop((first, second, third));
         assert_eq!(*lock(&uploads.n_reserved), 0);
     }
@@ -256,8 +280,6 @@ mod tests {
         assert_eq!(uploads.take(&guard.name, Body::from("abc"), patience).await, Ok(()));
         let again = uploads.take(&guard.name, Body::from("abc"), patience).await;
         assert_eq!(again, Err(UploadError::Unexpected));
-        let UploadGuard { ref name, .. } = guard;
-        assert_eq!(name.len(), 2 * NAME_BYTES);
         for (body, error) in [("ab", UploadError::TooSmall), ("abcd", UploadError::TooLarge)] {
             let guard = uploads.expect(3).unwrap();
             let taken = uploads.take(&guard.name, Body::from(body), patience).await;

@@ -2,6 +2,7 @@
 
 use crate::accumulator::Accumulator;
 use crate::frame::{Frame, Quality};
+use crate::lock::lock;
 use crate::outgoing::Outgoing;
 use crate::sample_counts::Stage;
 use crate::scene_provider::Error;
@@ -9,7 +10,7 @@ use crate::view::ViewState;
 use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use surfel_core::progress::Progress;
 use surfel_core::render::Renderer;
@@ -229,8 +230,4 @@ impl Progress for StaleCheck<'_> {
         let is_stale = self.client.version.load(Ordering::Relaxed) != self.version;
         self.client.out.is_closed() || is_stale && self.stale_timeout < self.start.elapsed()
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,9 +1,10 @@
 //! The table of open connections: those without an authorised request have few places, and lose them first.
 
 use crate::limits::Limits;
+use crate::lock::lock;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::net::{IpAddr, Ipv6Addr};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use tokio::sync::Notify;
 
 /// The open connections of a server.
@@ -61,7 +62,7 @@ impl ConnectionTable {
     }
 
     fn lock(&self) -> MutexGuard<'_, TableState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }
 

@@ -1,16 +1,16 @@
 //! Files of points and movies that pages have requested, until they are fetched or replaced.
 
-use crate::scene_provider::WrittenFile;
+use crate::lock::lock;
+use crate::random_name::random_name;
+use crate::scene_provider::{Result, WrittenFile};
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 use std::collections::HashMap;
 use std::io::Read;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Number of bytes that are read at once.
 const CHUNK_BYTES: usize = 1 << 18;
-/// Number of random bytes in the name of a file.
-const NAME_BYTES: usize = 16;
 
 /// The files of all pages, by random names.
 #[derive(Default)]
@@ -29,30 +29,21 @@ impl Downloads {
     /// # Errors
     ///
     /// Fails if the system has no random numbers.
-    pub fn add(
-        self: &Arc<Self>,
-        file: Arc<dyn WrittenFile>,
-    ) -> Result<DownloadGuard, getrandom::Error> {
-        let mut bytes = [0; NAME_BYTES];
-        getrandom::fill(&mut bytes)?;
-        let name: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        self.lock().insert(name.clone(), file);
+    pub fn add(self: &Arc<Self>, file: Arc<dyn WrittenFile>) -> Result<DownloadGuard> {
+        let name = random_name()?;
+        lock(&self.0).insert(name.clone(), file);
         Ok(DownloadGuard { downloads: self.clone(), name })
     }
 
     /// The file of this name, if it is kept.
     pub fn get(&self, name: &str) -> Option<Arc<dyn WrittenFile>> {
-        self.lock().get(name).cloned()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Arc<dyn WrittenFile>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0).get(name).cloned()
     }
 }
 
 impl Drop for DownloadGuard {
     fn drop(&mut self) {
-        self.downloads.lock().remove(&self.name);
+        lock(&self.downloads.0).remove(&self.name);
     }
 }
 

@@ -4,11 +4,12 @@
 //! [`SceneProvider`] prepares from the settings that pages send. The program that starts the server implements
 //! the provider. docs/server.md describes the messages between page and server, and the requests for programs.
 
+mod lock;
 mod scene_provider;
+mod random_name;
 mod merge_patch;
 mod limits;
 mod message;
-mod camera;
 mod frame_ancestors;
 mod access;
 mod bundle;

@@ -36,7 +36,7 @@ pub struct Limits {
     pub max_tasks: usize,
     /// Maximum number of one page's saved pictures, movies, files of points and added files that are made or on their way.
     pub max_page_saves: usize,
-    /// Maximum number of one page's questions about points at once: picks, profiles, volumes and histograms.
+    /// Maximum number of one page's questions at once: picks, profiles, volumes, histograms and exports.
     pub max_page_queries: usize,
     /// Maximum number of files that one page adds to its view.
     pub max_page_files: usize,
@@ -65,8 +65,8 @@ pub struct Timeouts {
     pub ping_interval: Duration,
     /// Maximum duration without any message or pong from a page.
     pub idle: Duration,
-    /// Duration for which a scene is prepared on although newer settings wait. Less would show nothing while
-    /// a slider is dragged.
+    /// Least duration for which a scene is prepared on although newer settings wait. It grows to what a preparation takes:
+    /// else nothing would be shown while a slider is dragged.
     pub stale_update: Duration,
     /// Duration after the last page has gone until what was made for pages is freed. A page that is loaded again comes
     /// back sooner.

@@ -48,7 +48,7 @@ pub async fn run_at_once<T: Send + 'static>(
     out: &mpsc::Sender<Outgoing>,
     work: impl FnOnce(&dyn SceneProvider, &dyn Progress) -> Result<T> + Send + 'static,
 ) -> Result<T> {
-    let provider = state.provider().await.ok_or(Error::Cancelled)?;
+    let provider = state.provider().await;
     let (page, for_cancel, queue) = (out.clone(), state.clone(), out.clone());
     let report = move |update: ProgressUpdate| {
         let ProgressUpdate { done, left_secs, .. } = update;

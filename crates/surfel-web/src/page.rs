@@ -39,12 +39,10 @@ const CACHE_AND_ASK: &str = "no-cache";
 static FILES: LazyLock<Vec<PageFile>> =
     LazyLock::new(|| page_files().expect("a test bundles the page"));
 
-/// The response with a file of the page for a request with these headers; an empty name stands for the page itself, which
-/// pages of `ancestors` may frame.
-pub fn file(name: &str, request: &HeaderMap, ancestors: &FrameAncestors) -> Response {
-    let Some(file) = FILES.iter().find(|file| file.name == name) else {
-        return (StatusCode::NOT_FOUND, "no such page; the viewer is at /").into_response();
-    };
+/// The response with a file of the page for a request with these headers, if there is one; an empty name stands for the page
+/// itself, which pages of `ancestors` may frame.
+pub fn file(name: &str, request: &HeaderMap, ancestors: &FrameAncestors) -> Option<Response> {
+    let file = FILES.iter().find(|file| file.name == name)?;
     let policy = HeaderValue::try_from(format!("{POLICY}{}", ancestors.source_list()));
     let policy = policy.expect("origins have characters of headers alone");
     let common = [
@@ -54,14 +52,14 @@ pub fn file(name: &str, request: &HeaderMap, ancestors: &FrameAncestors) -> Resp
         (header::VARY, HeaderValue::from_static("accept-encoding")),
     ];
     if request.get_all(header::IF_NONE_MATCH).iter().any(|tag| tag == file.tag) {
-        return (StatusCode::NOT_MODIFIED, common).into_response();
+        return Some((StatusCode::NOT_MODIFIED, common).into_response());
     }
     let content_type = [(header::CONTENT_TYPE, file.content_type)];
     if !accepts_gzip(request) {
-        return (common, content_type, file.plain.clone()).into_response();
+        return Some((common, content_type, file.plain.clone()).into_response());
     }
-    (common, content_type, [(header::CONTENT_ENCODING, "gzip")], file.gzipped.clone())
-        .into_response()
+    let encoding = [(header::CONTENT_ENCODING, "gzip")];
+    Some((common, content_type, encoding, file.gzipped.clone()).into_response())
 }
 
 /// Returns whether a client accepts compressed content.

@@ -1,8 +1,9 @@
 //! Settings changes of a page that wait until the scene before them is prepared; they wait merged into one.
 
+use crate::lock::lock;
 use crate::merge_patch::combine_patches;
 use crate::scene_provider::{Error, Result, SettingsMap};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use tokio::sync::Notify;
 
 /// A change of the settings; several changes are merged into one.
@@ -31,7 +32,7 @@ impl SettingsChange {
             return;
         }
         combine_patches(&mut self.patch, &newer.patch);
-        (self.seq, self.is_moving) = (newer.seq, newer.is_moving);
+        (self.seq, self.is_moving) = (self.seq.max(newer.seq), newer.is_moving);
     }
 }
 
@@ -100,7 +101,7 @@ impl PendingChanges {
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<SettingsChange>> {
-        self.change.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.change)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Progress of long work as updates for a page: the fraction done, and an estimate of the time left.
 
+use crate::lock::lock;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use surfel_core::progress::Progress;
 
@@ -62,7 +63,7 @@ where
         let stage = Stage { name: name.to_owned(), n_total: total, start: now, last_update: now };
         self.n_done.store(0, Ordering::Relaxed);
         (self.report)(stage.update(0, now));
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
+        *lock(&self.stage) = Some(stage);
     }
 
     fn advance(&self, units: u64) {

@@ -2,8 +2,9 @@
 
 use crate::client::{Client, MOVING_PAUSE};
 use crate::dynamic_resolution::draft_secs;
+use crate::lock::lock;
 use crate::sample_counts::Stage;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use surfel_core::render::Renderer;
@@ -133,7 +134,7 @@ impl RenderLoop {
     }
 
     fn lock(&self) -> MutexGuard<'_, LoopState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }
 

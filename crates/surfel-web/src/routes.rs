@@ -10,10 +10,11 @@ use crate::scene_provider::{Error, SceneProvider, SettingsMap};
 use crate::server_state::ServerState;
 use crate::session;
 use axum::body::{Body, to_bytes};
+use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{Extension, Path, Query, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state, map_response};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get, post};
@@ -39,6 +40,8 @@ pub fn router(state: Arc<ServerState>) -> Router {
         .route("/{file}", get(page_file))
         .route("/healthz", get(health))
         .merge(guarded)
+        .fallback(no_page)
+        .method_not_allowed_fallback(wrong_method)
         .layer(from_fn_with_state(state.clone(), check_origin))
         .layer(map_response(with_common_headers))
         .with_state(state)
@@ -73,6 +76,18 @@ impl From<Error> for Failure {
             }
         };
         Self(status, error.to_string())
+    }
+}
+
+impl From<PathRejection> for Failure {
+    fn from(rejection: PathRejection) -> Self {
+        Self(rejection.status(), rejection.body_text())
+    }
+}
+
+impl From<QueryRejection> for Failure {
+    fn from(rejection: QueryRejection) -> Self {
+        Self(rejection.status(), rejection.body_text())
     }
 }
 
@@ -118,16 +133,33 @@ async fn page(State(state): State<Arc<ServerState>>, request: Request) -> RouteR
             ];
             (StatusCode::SEE_OTHER, headers).into_response()
         }
-        None => page::file("", request.headers(), &state.guard.frame_ancestors),
+        None => page_response(&state, "", request.headers())?,
     })
 }
 
 async fn page_file(
     State(state): State<Arc<ServerState>>,
-    Path(name): Path<String>,
+    name: Result<Path<String>, PathRejection>,
     headers: HeaderMap,
-) -> Response {
-    page::file(&name, &headers, &state.guard.frame_ancestors)
+) -> RouteResult {
+    let Path(name) = name?;
+    page_response(&state, &name, &headers)
+}
+
+fn page_response(state: &ServerState, name: &str, headers: &HeaderMap) -> RouteResult {
+    page::file(name, headers, &state.guard.frame_ancestors).ok_or_else(missing_page)
+}
+
+async fn no_page() -> Failure {
+    missing_page()
+}
+
+fn missing_page() -> Failure {
+    Failure(StatusCode::NOT_FOUND, "no such page; the viewer is at /".into())
+}
+
+async fn wrong_method(method: Method) -> Failure {
+    Failure(StatusCode::METHOD_NOT_ALLOWED, format!("{method} is not answered at this address"))
 }
 
 /// The connection of a page. A request without an upgrade learns whether a page could connect, since browsers do not
@@ -183,7 +215,11 @@ async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {
 }
 
 /// A file of points or a movie that a page has requested.
-async fn download(State(state): State<Arc<ServerState>>, Path(name): Path<String>) -> RouteResult {
+async fn download(
+    State(state): State<Arc<ServerState>>,
+    name: Result<Path<String>, PathRejection>,
+) -> RouteResult {
+    let Path(name) = name?;
     let missing = || Failure(StatusCode::NOT_FOUND, "there is no such file any more".into());
     let file = state.downloads.get(&name).ok_or_else(missing)?;
     let body = downloads::body(&file).map_err(|_| missing())?;
@@ -199,9 +235,10 @@ async fn download(State(state): State<Arc<ServerState>>, Path(name): Path<String
 /// The bytes of a file that a page has announced.
 async fn added_file(
     State(state): State<Arc<ServerState>>,
-    Path(name): Path<String>,
+    name: Result<Path<String>, PathRejection>,
     body: Body,
 ) -> RouteResult {
+    let Path(name) = name?;
     let patience = state.limits.timeouts.request;
     let taken = state.uploads.take(&name, body, patience).await;
     let (status, text) = match taken {
@@ -219,8 +256,9 @@ async fn added_file(
 /// Renders with settings from the query, as on a command line: `?resolution=640x480&camera-azimuth-angle=30`.
 async fn render_query(
     State(state): State<Arc<ServerState>>,
-    Query(pairs): Query<Vec<(String, String)>>,
+    pairs: Result<Query<Vec<(String, String)>>, QueryRejection>,
 ) -> RouteResult {
+    let Query(pairs) = pairs?;
     let pairs = pairs.into_iter().filter(|(key, _)| key != "token");
     render(state, pairs.map(|(key, value)| (key, Value::String(value))).collect()).await
 }

@@ -16,8 +16,9 @@ pub type SettingsMap = Map<String, Value>;
 /// Makes scenes from settings. All clients share one provider; each client has its own settings.
 ///
 /// Settings come from untrusted clients: an implementation rejects keys that name files, and every other key
-/// that a client must not change. The server calls each method on a thread that belongs to no pool. A provider
-/// that works in parallel needs a thread pool of its own, or its work would delay rendering.
+/// that a client must not change. The server calls `info`, `startup_settings` and `camera` where it reads messages, so
+/// they must return at once, and each other method on a thread that belongs to no pool. A provider that works in
+/// parallel needs a thread pool of its own, or its work would delay rendering.
 pub trait SceneProvider: Send + Sync + 'static {
     /// Facts about the loaded data that do not depend on settings, as a JSON object. The server adds its limits and
     /// sends them to every page.
@@ -28,6 +29,13 @@ pub trait SceneProvider: Send + Sync + 'static {
 
     /// The settings that the user gave at startup, without automatic choices.
     fn startup_settings(&self) -> SettingsMap;
+
+    /// The camera of a complete `camera` setting.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a key is missing, or if its value makes no camera.
+    fn camera(&self, settings: &Value) -> Result<Camera>;
 
     /// A scene of a subset of the points, to show until `prepare` is done; none if it would not be faster, or if the
     /// points are prepared already.
@@ -52,7 +60,7 @@ pub trait SceneProvider: Send + Sync + 'static {
     fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>>;
 
     /// Returns the settings without those that pictures of their camera lack, as a scale bar with perspective.
-    fn drawable_settings(&self, settings: &SettingsMap) -> SettingsMap {
+    fn drawable_settings(&self, settings: &SettingsMap, _progress: &dyn Progress) -> SettingsMap {
         settings.clone()
     }
 
@@ -88,6 +96,13 @@ pub trait SceneProvider: Send + Sync + 'static {
         progress: &dyn Progress,
     ) -> Result<Arc<dyn WrittenFile>>;
 
+    /// Number of bytes of memory that the content of a file takes at least, as the file states it.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the bytes are of no known format or broken.
+    fn stated_bytes(&self, file: &SentFile) -> Result<u64>;
+
     /// Reads a file that a page adds to its view. The settings of the page then name it by its id, in the list `added_files`.
     ///
     /// # Errors
@@ -102,12 +117,12 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// Frees memory that can be made again, as no page is connected any more.
     fn release(&self) {}
 
-    /// These settings as a command line and as scene files.
+    /// These settings, without those that pictures of their camera lack, as a command line and as scene files.
     ///
     /// # Errors
     ///
-    /// Fails if a setting is invalid.
-    fn export(&self, settings: &SettingsMap) -> Result<Export>;
+    /// Fails if a setting is invalid, and if `progress` cancels.
+    fn export(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Export>;
 
     /// The settings in the text of a scene file that a page sends; `name` is the file's name.
     ///
@@ -208,7 +223,8 @@ pub struct PreparedScene {
     pub settings: SettingsMap,
     /// The `camera` setting at the scene's time, if the scene animates its camera.
     pub animated_camera: Option<Value>,
-    /// The scene to render; each client replaces its camera.
+    /// The scene to render, with the camera of its settings or, at the scene's time, of its animation; each client
+    /// replaces it by its own.
     pub flat: FlatScene,
     /// The render settings; each client replaces the size.
     pub render_settings: Settings,

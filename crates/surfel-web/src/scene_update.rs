@@ -1,6 +1,5 @@
 //! Applies a page's settings changes: prepares one scene at a time, from all changes that wait.
 
-use crate::camera;
 use crate::client::Client;
 use crate::handshake::Hello;
 use crate::merge_patch::apply_merge_patch;
@@ -11,7 +10,7 @@ use crate::scene_provider::{Error, PreparedScene, SceneProvider, SettingsMap};
 use crate::server_state::ServerState;
 use serde_json::{Value, json};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use surfel_core::progress::Progress;
 use tokio::sync::mpsc;
 
@@ -27,16 +26,27 @@ pub async fn run(
     let (width, height) = client.view().size;
     let (for_facts, of_scene) = (state.clone(), provider.clone());
     let facts = move || (of_scene.initial_settings(width, height), for_facts.info(&*of_scene));
-    let Ok((settings, info)) = state.run_blocking(facts).await else { return };
+    let (settings, info) = match state.run_blocking(facts).await {
+        Ok(found) => found,
+        Err(error) => return send_json(&out, &rejection(RequestRef::Unnumbered, &error)).await,
+    };
     // A server that was started again may show other data than those of the page's patch.
     let is_for_these = hello.name.is_none_or(|name| info["name"] == name);
     let patch = if is_for_these { hello.patch } else { SettingsMap::default() };
     pending.requeue(SettingsChange { patch, ..SettingsChange::default() });
     let welcome = json!({ "type": "welcome", "scene": settings, "info": info });
     send_json(&out, &welcome).await;
-    let shows_preview = false;
-    let mut updater =
-        SceneUpdater { state, client, pending, out, provider, settings, shows_preview };
+    let (shows_preview, stale_after) = (false, state.limits.timeouts.stale_update);
+    let mut updater = SceneUpdater {
+        state,
+        client,
+        pending,
+        out,
+        provider,
+        settings,
+        shows_preview,
+        stale_after,
+    };
     // Nothing would be prepared any more: the change would be cancelled and taken again without end.
     while !updater.out.is_closed() && !updater.state.is_stopped() {
         let mut change = updater.pending.take().await;
@@ -54,7 +64,7 @@ async fn wait_for_provider(
     loading.mark_changed();
     loop {
         tokio::select! {
-            provider = state.provider() => return provider,
+            provider = state.provider() => return Some(provider),
             changed = loading.changed() => {
                 changed.ok()?;
                 let update = loading.borrow_and_update().clone();
@@ -84,7 +94,12 @@ struct SceneUpdater {
     settings: SettingsMap,
     /// True if the page shows a preview of later settings.
     shows_preview: bool,
+    /// Duration after which a preparation is cancelled if newer settings wait.
+    stale_after: Duration,
 }
+
+/// Ratio of the time that a preparation may take to that of the one before it.
+const STALE_FACTOR: f64 = 1.5;
 
 impl SceneUpdater {
     /// Shows a subset of the points before the whole scene is prepared, if that takes long.
@@ -101,12 +116,12 @@ impl SceneUpdater {
 
     /// Replaces a preview of settings that were rejected by the last whole scene.
     async fn take_back_preview(&mut self, change: &SettingsChange) {
-        let (provider, settings) = (self.provider.clone(), self.settings.clone());
+        let kept = SettingsChange { seq: change.seq, ..SettingsChange::default() };
+        let (provider, settings) = (self.provider.clone(), self.settings_with(&kept));
         let reporter = self.reporter();
         let task = move || provider.prepare(&settings, &reporter);
         if let Ok(Ok(scene)) = self.state.run_blocking(task).await {
             self.shows_preview = false;
-            let kept = SettingsChange { seq: change.seq, ..SettingsChange::default() };
             self.show(scene, &kept).await;
         }
     }
@@ -114,16 +129,22 @@ impl SceneUpdater {
     /// Prepares and shows the scene with this change, or reports the reason why it cannot.
     async fn apply(&mut self, change: SettingsChange) {
         let (provider, settings) = (self.provider.clone(), self.settings_with(&change));
-        let reporter = self.reporter();
+        let (reporter, start) = (self.reporter(), Instant::now());
         let prepared =
             self.state.run_blocking(move || provider.prepare(&settings, &reporter)).await;
         match prepared.flatten() {
             Ok(scene) => {
+                // While settings keep coming, those that take as long are prepared to their end.
+                self.stale_after = start.elapsed().mul_f64(STALE_FACTOR).max(self.stale_update());
                 self.settings = scene.settings.clone();
                 self.shows_preview = false;
                 self.show(scene, &change).await;
             }
-            Err(Error::Cancelled) => self.pending.requeue(change),
+            Err(Error::Cancelled) => {
+                // Work that was cancelled again and again would show nothing.
+                self.stale_after *= 2;
+                self.pending.requeue(change);
+            }
             Err(error) => {
                 if self.shows_preview {
                     self.take_back_preview(&change).await;
@@ -136,7 +157,8 @@ impl SceneUpdater {
                 self.client.set_moving(change.is_moving);
                 // A page whose first settings are invalid shows the initial scene.
                 if self.client.view().scene.is_none() && !change.patch.is_empty() {
-                    let _ = self.pending.add(SettingsChange::default());
+                    let initial = SettingsChange { seq: change.seq, ..SettingsChange::default() };
+                    self.pending.requeue(initial);
                 }
             }
         }
@@ -178,7 +200,8 @@ impl SceneUpdater {
         let sets_camera = scene.animated_camera.is_some()
             || change.from_startup
             || change.patch.contains_key("camera");
-        let camera = camera::parse(shown_camera).ok();
+        // A preview whose camera is still to be chosen has none that the page knows.
+        let camera = (!shown_camera.is_null()).then_some(scene.flat.camera);
         let scene = Arc::new(scene);
         self.client.update_view(|view| {
             // The user may have moved the camera while the scene was prepared.
@@ -193,6 +216,10 @@ impl SceneUpdater {
         self.state.render_loop.notify();
     }
 
+    fn stale_update(&self) -> Duration {
+        self.state.limits.timeouts.stale_update
+    }
+
     /// Reports progress to the page. Cancels work once newer settings have waited long enough, or once nobody
     /// waits for the result any more.
     fn reporter(&self) -> impl Progress + Send + 'static {
@@ -202,9 +229,9 @@ impl SceneUpdater {
             // Dropped if the queue is full.
             let _ = queue.try_send(Outgoing::Text(progress_message(Some(&update)).to_string()));
         };
-        let stale_update = self.state.limits.timeouts.stale_update;
+        let stale_after = self.stale_after;
         let is_cancelled = move || {
-            let is_stale = stale_update < start.elapsed() && !pending.is_empty();
+            let is_stale = stale_after < start.elapsed() && !pending.is_empty();
             is_stale || state.is_stopped() || page.is_closed()
         };
         ProgressReporter::new(report, is_cancelled)

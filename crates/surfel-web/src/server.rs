@@ -54,8 +54,7 @@ impl Server {
         let io = |source| Error::Io { address: address.to_string(), source };
         let listener = TcpListener::bind(address).map_err(io)?;
         let bound = listener.local_addr().map_err(io)?;
-        let guard = AccessGuard::new(host)
-            .map_err(|error| Error::invalid_request(format!("token: {error}")))?;
+        let guard = AccessGuard::new(host)?;
         Ok(Self { listener, address: bound, guard, limits: Limits::default(), tls: None })
     }
 

@@ -32,9 +32,9 @@ pub struct ServerState {
     pub limits: Limits,
     /// One permit for each connected page.
     pub page_permits: Arc<Semaphore>,
-    /// One permit for each saved picture or file of points that is being made.
+    /// One permit for each saved picture, movie or file of points that is being made.
     pub render_permits: Arc<Semaphore>,
-    /// Files of points for the pages that have requested them.
+    /// Files of points and movies for the pages that have requested them.
     pub downloads: Arc<Downloads>,
     /// Files that pages are adding, and the memory of those that they have added.
     pub uploads: Arc<FileUploads>,
@@ -82,11 +82,12 @@ impl ServerState {
         self.is_stopped.load(Ordering::Relaxed)
     }
 
-    /// Waits until the files are loaded; none if the server stops first.
-    pub async fn provider(&self) -> Option<Arc<dyn SceneProvider>> {
+    /// Waits until the files are loaded. If the server stops before, this ends with its runtime.
+    pub async fn provider(&self) -> Arc<dyn SceneProvider> {
         let mut receiver = self.provider.subscribe();
-        let provider = receiver.wait_for(Option::is_some).await.ok()?;
-        provider.clone()
+        let loaded = receiver.wait_for(Option::is_some).await;
+        let loaded = loaded.expect("the state has the sender");
+        loaded.clone().expect("it was waited for")
     }
 
     /// The provider's facts about the data, with the limits that a page must know.
@@ -95,7 +96,6 @@ impl ServerState {
         info["limits"] = json!({
             "max_pixels": self.limits.max_view_pixels,
             "max_save_pixels": self.limits.max_save_pixels,
-            "max_samples": self.limits.max_samples,
             "max_message_bytes": self.limits.max_message_bytes,
             "max_added_file_bytes": self.limits.max_added_file_bytes,
         });

@@ -90,8 +90,7 @@ impl PageFile {
                 "{name}: needs {found} of memory, expected at most {limit}"
             ))
         };
-        let stated = surfel_formats::inspect_bytes(&name, bytes).map_err(surfel::Error::from);
-        let n_stated = stated.map_err(rejection)?.n_points.unwrap_or(0).saturating_mul(POINT_BYTES);
+        let n_stated = stated_bytes(&name, bytes)?;
         if max_bytes < n_stated {
             return Err(too_large(n_stated));
         }
@@ -172,6 +171,16 @@ impl AddedFile for PageFile {
     fn n_bytes(&self) -> u64 {
         self.n_bytes
     }
+}
+
+/// Returns the number of bytes that a file's points take at least, as the file states them.
+///
+/// # Errors
+///
+/// Fails if the bytes are of no known format or broken.
+pub fn stated_bytes(name: &str, bytes: &[u8]) -> Result<u64> {
+    let stated = surfel_formats::inspect_bytes(name, bytes).map_err(surfel::Error::from);
+    Ok(stated.map_err(rejection)?.n_points.unwrap_or(0).saturating_mul(POINT_BYTES))
 }
 
 /// Returns true if a description shows the object because a page has added it.

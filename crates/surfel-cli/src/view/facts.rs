@@ -1,17 +1,42 @@
 //! Facts about the loaded files that a page offers controls by.
 
 use super::legend::hex;
+use super::rows::Rows;
 use serde_json::{Value, json};
+use std::path::PathBuf;
 use surfel::SceneDescription;
 use surfel::crs::{Unit, short_name};
 use surfel::description::{CameraSettings, write_table};
+use surfel::file_names::{file_name, list_files};
 use surfel::resolve::{LoadedScene, coordinate_system, coordinate_system_text, located_stations};
 use surfel_core::image::{class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::points::{NOISE_CLASSES, PointCloud, PointFilter};
 use surfel_core::scene::color::ColorSource;
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::counted;
 use surfel_formats::{FileInfo, common_file_info};
+
+/// The names of the files that were typed, without their folders, which a page need not know. Without files: those of the
+/// rows, with the numbers of points and triangles, which tell them from others of these names.
+pub fn name(typed: &[PathBuf], rows: &Rows, (n_points, n_triangles): (usize, usize)) -> String {
+    if !typed.is_empty() {
+        return list_files(&typed.iter().map(|file| file_name(file).into()).collect::<Vec<_>>());
+    }
+    let names: Vec<PathBuf> = rows.names().into_iter().map(PathBuf::from).collect();
+    let sizes = [(n_points, "point"), (n_triangles, "triangle")].into_iter();
+    let sizes = sizes.filter(|(n, _)| 0 < *n).map(|(n, thing)| counted(n, thing));
+    format!("{} ({})", list_files(&names), sizes.collect::<Vec<_>>().join(", "))
+}
+
+/// Columns by which all clouds can be coloured.
+pub fn colors(scene: &LoadedScene) -> Vec<&str> {
+    let mut clouds = scene.clouds().map(|(_, cloud)| columns(cloud));
+    let mut names = clouds.next().unwrap_or_default();
+    clouds.for_each(|others| names.retain(|name| others.contains(name)));
+    names.extend(ColorSource::names_where(ColorSource::is_computed));
+    names
+}
 
 /// Columns of a cloud as `--color` takes them.
 pub fn columns(cloud: &PointCloud) -> Vec<&str> {

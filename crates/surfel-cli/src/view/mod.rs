@@ -13,6 +13,7 @@ mod coordinates;
 mod point;
 mod temp_download;
 mod camera_path;
+mod page_camera;
 mod shown_points;
 mod page_overlay;
 mod page_settings;

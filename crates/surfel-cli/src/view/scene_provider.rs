@@ -3,13 +3,14 @@
 use super::added_files::{self, AddedFiles, PageFile};
 use super::camera_path::{camera_path, with_path, write_movie};
 use super::facts::{
-    classes, columns, coordinate_system_facts, filter_columns, has_returns, stations, surfaces,
-    unit_symbol,
+    classes, colors, coordinate_system_facts, filter_columns, has_returns, name, stations,
+    surfaces, unit_symbol,
 };
 use super::file_names::{ClientProgress, ViewedFolders};
 use super::freed_memory;
 use super::histogram::histogram;
 use super::legend::legend_json;
+use super::page_camera::page_camera;
 use super::page_overlay::page_overlay;
 use super::page_settings::{self, Content};
 use super::point::{describe, locate};
@@ -26,17 +27,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
-use surfel::file_names::{file_name, list_files};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::{LiveView, SceneTrees};
 use surfel::overlay;
+use surfel::resolve::{AutoSettings, LoadedScene};
 use surfel_core::flat::PointId;
 use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::color::ColorSource;
-use surfel_core::scene::{Graph, Material};
+use surfel_core::scene::{Camera, Graph, Material};
 use surfel_web::{
     AddedFile, Error, Export, Limits, MovieRequest, PickedPoint, PointDescriber, PointLocator,
     PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
@@ -58,6 +59,8 @@ pub struct FileSceneProvider {
     /// The cameras at the stations of its scans.
     stations: Vec<Value>,
     folders: ViewedFolders,
+    /// The facts about the data, which are found by looking at all points.
+    info: Value,
     /// The initial settings of the last page, by the size of its picture.
     initial_settings: Mutex<Option<((u32, u32), SettingsMap)>>,
 }
@@ -83,7 +86,7 @@ impl FileSceneProvider {
         let stations = stations(scene.loaded(), auto.up);
         let (scene, up) = (Arc::new(scene), auto.up);
         let folders = viewed_folders(&startup, &typed);
-        Ok(Self {
+        let mut provider = Self {
             startup,
             startup_settings,
             typed,
@@ -95,8 +98,11 @@ impl FileSceneProvider {
             moves_camera,
             stations,
             folders,
+            info: Value::Null,
             initial_settings: Mutex::default(),
-        })
+        };
+        provider.info = provider.facts();
+        Ok(provider)
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
@@ -143,12 +149,19 @@ impl FileSceneProvider {
         })
     }
 
+    fn choose(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Chosen> {
+        let description = self.read(settings)?;
+        let progress = ClientProgress { folders: &self.folders, progress };
+        let chosen = self.scene.choose(&description, &progress).map_err(rejection);
+        let (kept, auto) = self.folders.removed(chosen)?;
+        Ok(Chosen { description, kept, auto })
+    }
+
     fn choose_initial_settings(&self, width: u32, height: u32) -> SettingsMap {
         let mut settings = self.startup_settings.clone();
         settings.insert("resolution".into(), json!(format!("{width}x{height}")));
         let complete = || {
-            let description = self.read(&settings).ok()?;
-            let (kept, auto) = self.scene.choose(&description, &NoProgress).ok()?;
+            let Chosen { description, kept, auto } = self.choose(&settings, &NoProgress).ok()?;
             let complete = auto.complete_description(&kept);
             let (content, source) = (self.content(&[]), kept.color_source());
             let mut initial =
@@ -161,6 +174,37 @@ impl FileSceneProvider {
         };
         // What was valid at the start is so for every size.
         complete().unwrap_or(settings.clone())
+    }
+
+    fn facts(&self) -> Value {
+        let loaded = self.scene.loaded();
+        let points = loaded.sample_points();
+        let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
+        let (coordinate_system, epsg) = coordinate_system_facts(loaded, &self.startup);
+        json!({
+            "name": name(&self.typed, &self.rows, (n_points, n_triangles)),
+            "points": n_points,
+            "triangles": n_triangles,
+            "version": env!("CARGO_PKG_VERSION"),
+            "bounds": bounds_json(&points),
+            "up": self.up.to_array(),
+            "surfaces": surfaces(loaded),
+            "colors": colors(loaded),
+            "colormaps": colormap::names().collect::<Vec<_>>(),
+            "materials": Material::NAMED.map(|(name, _)| name),
+            "objects": self.objects(),
+            "duration_secs": loaded.duration_secs(),
+            "camera_moves": self.moves_camera,
+            "stations": self.stations,
+            "classes": classes(loaded),
+            "has_returns": has_returns(loaded),
+            "columns": filter_columns(loaded),
+            "threads": self.scene.n_threads(),
+            "simd": self.scene.simd().name(),
+            "coordinate_system": coordinate_system,
+            "epsg": epsg,
+            "unit": unit_symbol(loaded, &self.startup),
+        })
     }
 
     /// The files and objects that pages change apart, each with its name, kind, number of points or triangles, and notes.
@@ -200,14 +244,24 @@ impl FileSceneProvider {
         }
         all
     }
+}
 
-    /// Columns by which all clouds can be coloured.
-    fn colors(&self) -> Vec<&str> {
-        let mut clouds = self.scene.loaded().clouds().map(|(_, cloud)| columns(cloud));
-        let mut names = clouds.next().unwrap_or_default();
-        clouds.for_each(|others| names.retain(|name| others.contains(name)));
-        names.extend(ColorSource::names_where(ColorSource::is_computed));
-        names
+/// A description of a page's settings, and what is chosen for it from the data.
+struct Chosen {
+    description: SceneDescription,
+    kept: Arc<LoadedScene>,
+    auto: AutoSettings,
+}
+
+impl Chosen {
+    /// Returns its settings without those that pictures of its camera lack.
+    fn drawable(&self, settings: &SettingsMap) -> SettingsMap {
+        let mut drawable = settings.clone();
+        let camera = &self.auto.camera.camera;
+        for fault in overlay::faults(&self.description.picture, camera, self.auto.up) {
+            drawable.shift_remove(&fault.path);
+        }
+        drawable
     }
 }
 
@@ -268,42 +322,9 @@ pub fn viewed_folders(startup: &SceneDescription, typed: &[PathBuf]) -> ViewedFo
     ViewedFolders::of(startup.named_files().chain(typed).map(PathBuf::as_path))
 }
 
-/// Names of files without their folders, which a page need not know.
-fn name_of(files: &[PathBuf]) -> String {
-    let names: Vec<PathBuf> = files.iter().map(|file| file_name(file).into()).collect();
-    list_files(&names)
-}
-
 impl SceneProvider for FileSceneProvider {
     fn info(&self) -> Value {
-        let loaded = self.scene.loaded();
-        let points = loaded.sample_points();
-        let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
-        let (coordinate_system, epsg) = coordinate_system_facts(loaded, &self.startup);
-        json!({
-            "name": name_of(&self.typed),
-            "points": n_points,
-            "triangles": n_triangles,
-            "version": env!("CARGO_PKG_VERSION"),
-            "bounds": bounds_json(&points),
-            "up": self.up.to_array(),
-            "surfaces": surfaces(loaded),
-            "colors": self.colors(),
-            "colormaps": colormap::names().collect::<Vec<_>>(),
-            "materials": Material::NAMED.map(|(name, _)| name),
-            "objects": self.objects(),
-            "duration_secs": loaded.duration_secs(),
-            "camera_moves": self.moves_camera,
-            "stations": self.stations,
-            "classes": classes(loaded),
-            "has_returns": has_returns(loaded),
-            "columns": filter_columns(loaded),
-            "threads": self.scene.n_threads(),
-            "simd": self.scene.simd().name(),
-            "coordinate_system": coordinate_system,
-            "epsg": epsg,
-            "unit": unit_symbol(loaded, &self.startup),
-        })
+        self.info.clone()
     }
 
     fn initial_settings(&self, width: u32, height: u32) -> SettingsMap {
@@ -320,6 +341,10 @@ impl SceneProvider for FileSceneProvider {
 
     fn startup_settings(&self) -> SettingsMap {
         self.startup_settings.clone()
+    }
+
+    fn camera(&self, settings: &Value) -> Result<Camera> {
+        page_camera(settings)
     }
 
     fn preview(
@@ -364,17 +389,9 @@ impl SceneProvider for FileSceneProvider {
         view.finished(self.folders.removed(image)?).png_bytes().map_err(rejection)
     }
 
-    fn drawable_settings(&self, settings: &SettingsMap) -> SettingsMap {
-        let mut drawable = settings.clone();
-        let faults = || {
-            let description = self.read(settings).ok()?;
-            let (_, auto) = self.scene.choose(&description, &NoProgress).ok()?;
-            Some(overlay::faults(&description.picture, &auto.camera.camera, auto.up))
-        };
-        for fault in faults().unwrap_or_default() {
-            drawable.shift_remove(&fault.path);
-        }
-        drawable
+    fn drawable_settings(&self, settings: &SettingsMap, progress: &dyn Progress) -> SettingsMap {
+        let chosen = self.choose(settings, progress);
+        chosen.map_or_else(|_| settings.clone(), |chosen| chosen.drawable(settings))
     }
 
     fn histogram(&self, column: &str) -> Result<Value> {
@@ -407,6 +424,10 @@ impl SceneProvider for FileSceneProvider {
         self.folders.removed(write_movie(&self.scene, description, options, &self.limits, progress))
     }
 
+    fn stated_bytes(&self, file: &SentFile) -> Result<u64> {
+        added_files::stated_bytes(file.name, file.bytes)
+    }
+
     fn read_added_file(
         &self,
         file: &SentFile,
@@ -421,10 +442,13 @@ impl SceneProvider for FileSceneProvider {
         freed_memory::give_back();
     }
 
-    fn export(&self, settings: &SettingsMap) -> Result<Export> {
-        let description = self.read(settings)?;
-        let chosen = self.scene.choose(&description, &NoProgress).map_err(rejection);
-        let (kept, auto) = self.folders.removed(chosen)?;
+    fn export(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Export> {
+        let mut chosen = self.choose(settings, progress)?;
+        let drawable = chosen.drawable(settings);
+        if drawable != *settings {
+            chosen = self.choose(&drawable, progress)?;
+        }
+        let Chosen { description, kept, auto } = chosen;
         let mut complete = auto.complete_description(&kept);
         let path = camera_path(settings)?;
         let movie = path.clone().map(|path| toml_of(&with_path(complete.clone(), path)));

@@ -2,12 +2,12 @@
 
 use crate::add_file::{self, Announcement};
 use crate::added_files::PageFiles;
-use crate::camera;
 use crate::client::Client;
 use crate::downloads::DownloadGuard;
 use crate::frame;
 use crate::handshake::handshake;
 use crate::limits::RateLimiter;
+use crate::lock::lock;
 use crate::long_work::run_slowly;
 use crate::message::Incoming;
 use crate::outgoing::{Outgoing, RequestRef, rejection, send_json, write};
@@ -23,7 +23,7 @@ use futures_util::stream::SplitStream;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use surfel_core::progress::Progress;
 use tokio::sync::{Semaphore, mpsc};
@@ -224,7 +224,9 @@ impl Session {
     }
 
     async fn set_camera(&self, seq: u32, camera_settings: Value, is_moving: bool) {
-        match camera::parse(&camera_settings) {
+        let provider = self.state.provider.borrow().clone();
+        let loading = || Error::invalid_request("the files are still being loaded");
+        match provider.ok_or_else(loading).and_then(|provider| provider.camera(&camera_settings)) {
             Ok(camera) => {
                 self.client.update_view(|view| {
                     view.camera = Some(camera);
@@ -303,7 +305,8 @@ impl Session {
         let (state, out, permit) = (self.state.clone(), self.out.clone(), self.save_permit.clone());
         tokio::spawn(async move {
             let render = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
-                provider.render_png(&provider.drawable_settings(&settings), progress)
+                let drawable = provider.drawable_settings(&settings, progress);
+                provider.render_png(&drawable, progress)
             };
             let png = run_slowly(&state, &permit, id, is_cancelled.clone(), &out, render).await;
             let message = match png {
@@ -336,7 +339,8 @@ impl Session {
             return self.reject(RequestRef::Id(id), &error).await;
         }
         self.write_file(id, size, FileKind::Movie, move |provider, settings, progress| {
-            provider.write_movie(&provider.drawable_settings(settings), &options, progress)
+            let drawable = provider.drawable_settings(settings, progress);
+            provider.write_movie(&drawable, &options, progress)
         })
         .await;
     }
@@ -368,16 +372,12 @@ impl Session {
                 write(provider, &settings, progress)
             };
             let written = run_slowly(&state, &permit, id, is_cancelled, &out, write).await;
-            let kept = written.and_then(|file| {
-                let guard = state.downloads.add(file.clone());
-                let text = "the system has no random numbers";
-                Ok((guard.map_err(|_| Error::invalid_request(text))?, file))
-            });
+            let kept = written.and_then(|file| Ok((state.downloads.add(file.clone())?, file)));
             let message = match kept {
                 Ok((guard, file)) => {
                     let address = format!("downloads/{}", guard.name);
                     // The file of this kind before it goes.
-                    downloads.lock().unwrap_or_else(PoisonError::into_inner).insert(kind, guard);
+                    lock(&downloads).insert(kind, guard);
                     let (name, count) = kind.words();
                     json!({ "type": name, "id": id, "address": address, count: file.n_items(), "n_bytes": file.n_bytes() })
                 }
@@ -396,20 +396,18 @@ impl Session {
         if let Some(measurements) = measurements {
             settings.insert("measurements".into(), measurements);
         }
-        let export = move || provider.export(&provider.drawable_settings(&settings));
-        let export = self.state.run_blocking(export).await;
-        let message = match export.flatten() {
-            Ok(export) => json!({
+        let export = move |progress: &dyn Progress| {
+            let export = provider.export(&settings, progress)?;
+            Ok(json!({
                 "type": "export",
                 "id": id,
                 "command": export.command,
                 "toml": export.toml,
                 "json": export.json,
                 "movie": export.movie,
-            }),
-            Err(error) => rejection(RequestRef::Id(id), &error),
+            }))
         };
-        send_json(&self.out, &message).await;
+        self.answer(id, export).await;
     }
 
     async fn load_scene(&self, id: u32, name: String, text: String) {

@@ -1,4 +1,4 @@
-//! Questions of a page about points: each is answered by a task of its own.
+//! Questions of a page: each is answered by a task of its own.
 
 use super::Session;
 use crate::outgoing::{RequestRef, rejection, send_json};
@@ -15,9 +15,10 @@ use surfel_core::progress::Progress;
 
 impl Session {
     pub(super) async fn pick(&self, id: u32, pixel: (f64, f64)) {
-        let (client, renderer) = (self.client.clone(), self.state.renderer.clone());
+        // The pixel is one of this view, whatever camera follows.
+        let (view, renderer) = (self.client.view(), self.state.renderer.clone());
         let pick = move |progress: &dyn Progress| {
-            let picked = pick::pick(&*renderer, &client.view(), pixel, progress);
+            let picked = pick::pick(&*renderer, &view, pixel, progress)?;
             let point = picked.map(|(scene, point)| (scene.describe)(&scene.flat, &point));
             Ok(json!({ "type": "pick", "id": id, "point": point }))
         };
@@ -76,13 +77,13 @@ impl Session {
     }
 
     /// Sends what `find` returns, unless too many answers are being found already.
-    async fn answer(
+    pub(super) async fn answer(
         &self,
         id: u32,
         find: impl FnOnce(&dyn Progress) -> Result<Value> + Send + 'static,
     ) {
         let Ok(permit) = self.queries.clone().try_acquire_owned() else {
-            let text = "too many questions about points at once; wait for an answer";
+            let text = "too many questions at once; wait for an answer";
             return self.reject(RequestRef::Id(id), &Error::invalid_request(text)).await;
         };
         let (state, out) = (self.state.clone(), self.out.clone());

@@ -99,6 +99,35 @@ async fn announced_files_of_all_pages_count() {
 }
 
 #[tokio::test]
+async fn content_counts_while_it_is_read() {
+    let server = start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    let path = announced(&mut page, 1, "a", 4).await;
+    assert_eq!(post(&server, &path, b"slow").await.status, 204);
+    wait_until(|| server.provider.n_started.load(Ordering::Relaxed) == 1).await;
+    let mut other = TestPage::open(&server, json!({})).await;
+    announce(&mut other, 2, "b", 10_000_000).await;
+    assert_refused(&mut other, "leave").await;
+    page.send_json(json!({ "type": "cancel", "id": 1 })).await;
+    assert_refused(&mut page, "cancelled").await;
+    announce(&mut other, 3, "b", 10_000_000).await;
+    assert_eq!(other.message_of(3).await["type"], "upload");
+}
+
+#[tokio::test]
+async fn files_that_are_sent_at_once_have_names_of_their_own() {
+    let server = start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    let paths = [announced(&mut page, 1, "a", 5).await, announced(&mut page, 2, "a", 5).await];
+    for path in paths {
+        assert_eq!(post(&server, &path, b"1 2 3").await.status, 204);
+    }
+    let names = [page.message("added").await, page.message("added").await];
+    let names = names.map(|message| message["file"]["name"].clone());
+    assert_ne!(names[0], names[1]);
+}
+
+#[tokio::test]
 async fn a_page_adds_few_files() {
     let server = start();
     let mut page = TestPage::open(&server, json!({})).await;

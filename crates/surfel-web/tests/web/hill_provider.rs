@@ -1,6 +1,6 @@
 //! A provider of a small hill, whose settings make it slow, blocked or faulty on demand.
 
-use crate::test_page::camera;
+use crate::test_page::{camera, camera_of};
 use serde_json::{Value, json};
 use std::io::{Cursor, Read};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -53,6 +53,7 @@ impl Gate {
 /// |---|---|
 /// | `slow` | preparation takes this many seconds, unless it is cancelled |
 /// | `slow_render` | rendering for `/render` and saves takes this many seconds, unless it is cancelled |
+/// | `slow_export` | export takes this many seconds, unless it is cancelled |
 /// | `gated` | preparation waits for the gate and cannot be cancelled |
 /// | `locked` | preparation takes this many seconds in a thread pool, with a lock held |
 /// | `panic` | preparation panics |
@@ -81,6 +82,9 @@ pub struct HillProvider {
 }
 
 impl HillProvider {
+    /// The initial settings of a page of this width make the provider panic.
+    pub const FAULTY_WIDTH: u32 = 13;
+
     pub fn new() -> Self {
         let hill = |i: u32| {
             let (x, y) = ((i % 50) as f32 / 25.0 - 1.0, (i / 50) as f32 / 25.0 - 1.0);
@@ -210,7 +214,8 @@ impl SceneProvider for HillProvider {
         json!({ "name": "hill" })
     }
 
-    fn initial_settings(&self, _width: u32, _height: u32) -> SettingsMap {
+    fn initial_settings(&self, width: u32, _height: u32) -> SettingsMap {
+        assert_ne!(width, Self::FAULTY_WIDTH, "requested by a test");
         let Camera { position, focal_point, view_up, projection } = self.flat.camera;
         let Projection::Perspective { view_angle_deg } = projection else { unreachable!() };
         settings_map(json!({
@@ -226,6 +231,10 @@ impl SceneProvider for HillProvider {
 
     fn startup_settings(&self) -> SettingsMap {
         settings_map(json!({ "tint": 7 }))
+    }
+
+    fn camera(&self, settings: &Value) -> Result<Camera> {
+        camera_of(settings)
     }
 
     fn preview(
@@ -262,11 +271,13 @@ impl SceneProvider for HillProvider {
                 "points" => flat = self.rasterized.clone(),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
                 "camera" | "tint" | "added_files" | "stamp" | "preview" | "resolution"
-                | "slow_render" => {}
+                | "slow_render" | "slow_export" => {}
                 _ => return Err(Error::invalid_value(key, "unknown key")),
             }
             complete.insert(key.clone(), value.clone());
         }
+        let camera_settings = animated_camera.as_ref().unwrap_or(&complete["camera"]);
+        flat.camera = camera_of(camera_settings)?;
         Ok(PreparedScene {
             settings: complete,
             animated_camera,
@@ -332,6 +343,10 @@ impl SceneProvider for HillProvider {
         self.write_points(settings, if options.format == "gif" { "laz" } else { "" }, progress)
     }
 
+    fn stated_bytes(&self, file: &SentFile) -> Result<u64> {
+        Ok(if file.bytes.starts_with(b"slow") { 25_000_000 } else { 0 })
+    }
+
     fn read_added_file(
         &self,
         file: &SentFile,
@@ -349,7 +364,10 @@ impl SceneProvider for HillProvider {
         Ok(Arc::new(HillFile { name, n_bytes: factor * file.bytes.len() as u64 }))
     }
 
-    fn export(&self, settings: &SettingsMap) -> Result<Export> {
+    fn export(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Export> {
+        if let Some(secs) = settings.get("slow_export").and_then(Value::as_f64) {
+            self.work(secs, progress)?;
+        }
         let json = Value::Object(settings.clone()).to_string();
         Ok(Export { command: "surfel render hill".into(), toml: String::new(), json, movie: None })
     }

@@ -33,6 +33,20 @@ async fn paths_do_not_reach_the_file_system() {
 }
 
 #[tokio::test]
+async fn every_error_is_json() {
+    let server = TestServer::start();
+    for (path, status) in [("/nothing", 404), ("/a/b", 404), ("/%ff", 400), ("/downloads/%ff", 400)]
+    {
+        let response = get(&server, path).await;
+        assert_eq!(response.status, status, "{path}");
+        assert!(response.json()["error"].is_string(), "{path}");
+    }
+    let response = post(&server, "/scene", b"{}").await;
+    assert_eq!((response.status, response.header("allow")), (405, Some("GET,HEAD")));
+    assert_eq!(response.json()["error"], "POST is not answered at this address");
+}
+
+#[tokio::test]
 async fn programs_get_pictures_settings_and_statistics() {
     let server = TestServer::start();
     server.assert_serves_pictures().await;

@@ -1,11 +1,13 @@
 //! The messages between page and server.
 
+use crate::hill_provider::FaultyRenderer;
 use crate::http_client::get;
 use crate::test_page::{Picture, Received, SAVED, TestPage};
 use crate::test_server::{TestServer, wait_until};
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use surfel_web::Limits;
 
 #[tokio::test]
 async fn a_page_gets_welcome_scene_and_statistics() {
@@ -352,4 +354,47 @@ async fn writing_points_can_be_cancelled() {
     page.send_json(json!({ "type": "cancel", "id": 9 })).await;
     let error = page.message("error").await;
     assert_eq!((&error["id"], &error["text"]), (&json!(9), &json!("cancelled")));
+}
+
+#[tokio::test]
+async fn a_pick_that_fails_is_an_error() {
+    let server = TestServer::start();
+    let scene = json!({ "fault": FaultyRenderer::WHOLE, "points": true });
+    let mut page = TestPage::open(&server, scene).await;
+    page.finished_picture().await;
+    page.send_json(json!({ "type": "pick", "id": 1, "x": 32, "y": 24 })).await;
+    assert_eq!(page.message_of(1).await["type"], "error");
+}
+
+#[tokio::test]
+async fn a_pixel_is_one_of_the_view_before_the_next_camera() {
+    let server = TestServer::start_with_limits(Limits { max_tasks: 1, ..Limits::default() });
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.set_camera(1, 1.0, false).await;
+    page.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
+    let pick = |id: u32| json!({ "type": "pick", "id": id, "x": 32, "y": 24 });
+    page.send_json(pick(1)).await;
+    let expected = page.message_of(1).await["point"].clone();
+    assert!(expected["index"].is_u64());
+    page.change_settings(2, json!({ "gated": true })).await;
+    page.send_json(pick(2)).await;
+    page.set_camera(3, 3.0, false).await;
+    page.wait_for_picture(|picture| picture.seq == 3).await;
+    server.provider.gate.open();
+    assert_eq!(page.message_of(2).await["point"], expected);
+    page.send_json(pick(3)).await;
+    assert_ne!(page.message_of(3).await["point"], expected);
+}
+
+#[tokio::test]
+async fn an_export_does_not_block_its_page() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "slow_export": 100 })).await;
+    page.finished_picture().await;
+    page.send_json(json!({ "type": "export", "id": 1, "width": 3, "height": 2 })).await;
+    wait_until(|| server.provider.n_started.load(Ordering::Relaxed) == 1).await;
+    page.set_camera(1, 1.0, false).await;
+    page.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
+    drop(page);
+    wait_until(|| server.provider.n_cancelled.load(Ordering::Relaxed) == 1).await;
 }

@@ -1,6 +1,6 @@
 //! Preparation of scenes: its progress is reported, stale work is cancelled, and no page delays another.
 
-use crate::hill_provider::{FaultyRenderer, Gate};
+use crate::hill_provider::{FaultyRenderer, Gate, HillProvider};
 use crate::test_page::{Picture, TestPage, camera};
 use crate::test_server::{TestServer, wait_until};
 use serde_json::{Value, json};
@@ -29,12 +29,28 @@ async fn a_preview_of_rejected_settings_is_taken_back() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({ "tint": 3 })).await;
     page.message("scene").await;
-    page.change_settings(1, json!({ "preview": true, "invalid": 1 })).await;
+    page.set_camera(1, 2.0, false).await;
+    page.change_settings(2, json!({ "preview": true, "invalid": 1 })).await;
     let preview = page.message("scene").await;
     assert_eq!(preview["legend"], "preview");
     let kept = page.message("scene").await;
-    assert_eq!((&kept["seq"], &kept["scene"]["tint"]), (&json!(1), &json!(3)));
+    assert_eq!((&kept["seq"], &kept["scene"]["tint"]), (&json!(2), &json!(3)));
+    assert_eq!(kept["camera"], camera(2.0), "pictures show the page's camera");
     assert_eq!(page.message("error").await["key"], "invalid");
+}
+
+/// The rules of scene files decide which cameras there are, and no others.
+#[tokio::test]
+async fn a_narrow_camera_of_the_provider_is_shown() {
+    let server = TestServer::start();
+    let mut narrow = camera(1.0);
+    narrow["view_angle"] = json!(0.05);
+    let mut page = TestPage::open(&server, json!({ "camera": narrow })).await;
+    assert_eq!(page.message("scene").await["camera"], narrow);
+    page.finished_picture().await;
+    narrow["view_angle"] = json!(179.5);
+    page.send_json(json!({ "type": "camera", "seq": 1, "camera": narrow })).await;
+    page.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
 }
 
 #[tokio::test]
@@ -65,6 +81,46 @@ async fn work_for_older_settings_is_cancelled() {
     assert_eq!((&scene["seq"], &scene["scene"]["tint"]), (&json!(2), &json!(4)));
     assert_eq!(server.provider.n_cancelled.load(Ordering::Relaxed), 1);
     page.progress_state(None).await;
+}
+
+#[tokio::test]
+async fn scenes_are_shown_while_slow_settings_keep_coming() {
+    let timeouts = Timeouts { stale_update: Duration::from_millis(50), ..Timeouts::default() };
+    let server = TestServer::start_with_limits(Limits { timeouts, ..Limits::default() });
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.message("scene").await;
+    let mut n_scenes = 0;
+    let mut seq = 0;
+    while n_scenes < 3 {
+        seq += 1;
+        assert!(seq < 1000, "{n_scenes} scenes were shown");
+        page.change_settings(seq, json!({ "slow": 0.2, "tint": seq })).await;
+        let messages = page.messages_within(Duration::from_millis(20)).await;
+        n_scenes += messages.iter().filter(|message| message["type"] == "scene").count();
+    }
+    assert!(1 <= server.provider.n_cancelled.load(Ordering::Relaxed));
+}
+
+#[tokio::test]
+async fn the_initial_scene_confirms_what_came_after_invalid_settings() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "gated": true, "invalid": 1 })).await;
+    page.message("welcome").await;
+    page.change_settings(8, json!({ "gated": null, "invalid": null, "tint": 4 })).await;
+    page.sync().await;
+    server.provider.gate.open();
+    let scene = page.message("scene").await;
+    assert_eq!((&scene["seq"], &scene["scene"]["tint"]), (&json!(8), &json!(4)));
+}
+
+#[tokio::test]
+async fn a_page_learns_that_there_is_no_initial_scene() {
+    let server = TestServer::start();
+    let mut page = TestPage::connect(&server).await.unwrap();
+    let width = HillProvider::FAULTY_WIDTH;
+    page.send_json(json!({ "type": "hello", "width": width, "height": 9, "scene": {} })).await;
+    let error = page.message("error").await;
+    assert_eq!(error["text"], "internal error; please report it");
 }
 
 #[tokio::test]

@@ -5,9 +5,12 @@ use crate::test_server::{TIMEOUT, TestServer};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
+use surfel_core::math::DVec3;
+use surfel_core::scene::{Camera, CameraFit, Projection};
+use surfel_web::Error;
 use tokio::net::{TcpSocket, TcpStream};
 use tokio::time::timeout;
-use tokio_tungstenite::tungstenite::{Error, Message};
+use tokio_tungstenite::tungstenite::{self, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, client_async, connect_async};
 
 pub struct TestPage {
@@ -88,7 +91,7 @@ fn placed_files(mut bytes: &[u8]) -> Vec<([u16; 4], Vec<u8>)> {
 
 impl TestPage {
     /// A connection on which nothing has been sent.
-    pub async fn connect(server: &TestServer) -> Result<Self, Error> {
+    pub async fn connect(server: &TestServer) -> Result<Self, tungstenite::Error> {
         let link = server.link.replacen("http", "ws", 1);
         let (base, query) = link.rsplit_once('/').unwrap();
         let (socket, _) = connect_async(format!("{base}/ws{query}")).await?;
@@ -134,7 +137,7 @@ impl TestPage {
         self.send(Message::text(message.to_string())).await.unwrap();
     }
 
-    pub async fn send(&mut self, message: Message) -> Result<(), Error> {
+    pub async fn send(&mut self, message: Message) -> Result<(), tungstenite::Error> {
         self.socket.send(message).await
     }
 
@@ -236,6 +239,20 @@ impl TestPage {
         let _ = timeout(duration, async { while self.next().await.is_some() {} }).await;
     }
 
+    /// The messages received within this duration; pictures are acknowledged.
+    pub async fn messages_within(&mut self, duration: Duration) -> Vec<Value> {
+        let end = Instant::now() + duration;
+        let mut messages = Vec::new();
+        let left = || end.saturating_duration_since(Instant::now());
+        while let Ok(received) = timeout(left(), self.next()).await {
+            match received.expect("the server closed the connection") {
+                Received::Message(message) => messages.push(message),
+                Received::Picture(picture) => self.acknowledge(&picture).await,
+            }
+        }
+        messages
+    }
+
     /// Drops all messages until the server closes the connection.
     pub async fn wait_until_closed(&mut self) {
         while self.next().await.is_some() {}
@@ -257,4 +274,25 @@ impl TestPage {
 pub fn camera(angle_rad: f64) -> Value {
     let position = [5.0 * angle_rad.sin(), -5.0 * angle_rad.cos(), 3.0];
     json!({ "position": position, "focal_point": [0, 0, 0], "view_up": [0, 0, 1] })
+}
+
+/// The camera of such settings; angles up to that of a scene file's rules are valid.
+pub fn camera_of(settings: &Value) -> surfel_web::Result<Camera> {
+    let point = |key: &str| {
+        let point = serde_json::from_value(settings[key].clone()).map(DVec3::from_array);
+        let is_valid = |point: &DVec3| point.is_finite() && point.abs().max_element() < 1e15;
+        let point = point.ok().filter(is_valid);
+        point.ok_or_else(|| Error::invalid_value(format!("camera.{key}"), "expected a point"))
+    };
+    let usual = CameraFit::default().view_angle_deg;
+    let view_angle_deg = settings["view_angle"].as_f64().unwrap_or(usual);
+    if !(0.0 < view_angle_deg && view_angle_deg < 180.0) {
+        return Err(Error::invalid_value("camera.view_angle", "expected degrees"));
+    }
+    let (position, focal_point) = (point("position")?, point("focal_point")?);
+    if position == focal_point {
+        return Err(Error::invalid_value("camera.position", "is the focal point too"));
+    }
+    let projection = Projection::Perspective { view_angle_deg };
+    Ok(Camera { position, focal_point, view_up: point("view_up")?, projection })
 }

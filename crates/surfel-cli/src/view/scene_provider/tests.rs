@@ -73,9 +73,54 @@ fn exported_commands_restore_defaults_that_a_scene_file_changes() {
     let mut settings = provider.startup_settings();
     settings.insert("spp".into(), json!(4));
     settings.insert("camera".into(), json!({ "lock": false }));
-    let command = provider.export(&settings).unwrap().command;
+    let command = provider.export(&settings, &NoProgress).unwrap().command;
     let has = |option: &str| command.split(' ').any(|word| word == option);
     assert!(has("--spp=4") && has("--camera-lock=false"), "{command}");
+}
+
+#[test]
+fn facts_are_found_once() {
+    let provider = open(startup());
+    assert_eq!(provider.info(), provider.facts());
+    let other = FileSceneProvider { info: json!({ "name": "found" }), ..provider };
+    assert_eq!(other.info()["name"], "found");
+}
+
+#[test]
+fn an_export_chooses_once_unless_its_picture_lacks_a_setting() {
+    struct Choices(Mutex<Vec<String>>, bool);
+    impl Progress for Choices {
+        fn note(&self, line: &str) {
+            self.0.lock().unwrap().push(line.to_owned());
+        }
+        fn is_cancelled(&self) -> bool {
+            self.1
+        }
+    }
+    let provider = open(startup());
+    let mut settings = provider.startup_settings();
+    let mut exported = |is_cancelled, scale_bar: bool| {
+        settings.insert("scale_bar".into(), json!(scale_bar));
+        let choices = Choices(Mutex::default(), is_cancelled);
+        let export = provider.export(&settings, &choices);
+        let choices = choices.0.into_inner().unwrap();
+        (export, choices.iter().filter(|line| line.starts_with("camera at")).count())
+    };
+    let (export, n_cameras) = exported(false, false);
+    assert_eq!((n_cameras, export.unwrap().command.contains("scale-bar")), (1, false));
+    let (export, n_cameras) = exported(false, true);
+    assert_eq!((n_cameras, export.unwrap().command.contains("scale-bar")), (2, false));
+    assert!(matches!(exported(true, false).0, Err(Error::Cancelled)));
+}
+
+#[test]
+fn a_camera_that_a_scene_file_may_have_is_one_of_a_page() {
+    let mut startup = startup();
+    startup.camera.view_angle = Some(0.05);
+    let provider = open(startup);
+    let prepared = provider.prepare(&provider.initial_settings(40, 30), &NoProgress).unwrap();
+    let camera = provider.camera(&prepared.settings["camera"]).unwrap();
+    assert_eq!(camera, prepared.flat.camera);
 }
 
 #[test]
