@@ -321,9 +321,12 @@ fn cloud_of(
             Some(vectors(&checked(py, "numbers", ("normals", normals, (n_points, 3)))?)?);
     }
     if let Some(radii) = column_of("radii")? {
+        // An array of one number is no radius of all points, although it converts to one.
+        let shape = radii.getattr_opt("shape")?;
+        let is_one = shape.is_none_or(|shape| shape.len().is_ok_and(|n_axes| n_axes == 0));
         cloud.radii = Some(match radii.extract::<f32>() {
-            Ok(radius) => vec![radius; n_points],
-            Err(_) => singles(&checked(py, "numbers", ("radii", radii, (n_points,)))?)?,
+            Ok(radius) if is_one => vec![radius; n_points],
+            _ => singles(&checked(py, "numbers", ("radii", radii, (n_points,)))?)?,
         });
     }
     if let Some(colors) = column_of("colors")? {

@@ -400,3 +400,41 @@ def test_what_stays_in_its_process_says_what_travels(points, copied):
     for value in (scene, cloud, scene.render(), surfel.Mesh(points, [[0, 1, 2]])):
         with pytest.raises(TypeError, match=f"surfel.{type(value).__name__} .*cannot be pickled; a surfel.dask.Recipe"):
             copied(value)
+
+
+def misaligned(array):
+    """The numbers of an array, in rows one after the other, at an odd address, as of a file behind its header."""
+    copy = numpy.frombuffer(b"x" + array.tobytes(), array.dtype, offset=1).reshape(array.shape)
+    assert copy.flags.c_contiguous and not copy.flags.aligned
+    return copy
+
+
+def test_arrays_at_odd_addresses_are_taken(points):
+    n = len(points)
+    single = points.astype("f4")
+    columns = {
+        "normals": numpy.tile(numpy.float32([0, 0, 1]), (n, 1)),
+        "radii": numpy.full(n, 0.1, "f4"),
+        "colors": numpy.full((n, 3), 300, "u2"),
+        "intensity": numpy.arange(n, dtype="f4"),
+    }
+    scalars = {"age": numpy.arange(n, dtype="i4")}
+    odd = {name: misaligned(column) for name, column in columns.items()}
+    cloud = surfel.Cloud(misaligned(single), scalars={"age": misaligned(scalars["age"])}, **odd)
+    expected = surfel.Cloud(single, scalars=scalars, **columns)
+    assert (cloud.points == expected.points).all() and (cloud.scalars["age"] == scalars["age"]).all()
+    for name in columns:
+        assert (getattr(cloud, name) == getattr(expected, name)).all(), name
+    triangles = numpy.arange(6, dtype="u4").reshape(2, 3)
+    assert (surfel.Mesh(misaligned(points[:6]), misaligned(triangles)).triangles == triangles).all()
+    scene = surfel.Scene()
+    scene.add(cloud)
+    rays = numpy.float32([[0, 0, 5, 0, 0, -1]])
+    assert scene.cast_rays(misaligned(rays))["t_hit"] == scene.cast_rays(rays)["t_hit"]
+
+
+def test_a_radius_of_all_points_is_a_number(points):
+    for radius in (0.1, numpy.float32(0.1), numpy.array(0.1)):
+        assert (surfel.Cloud(points, radii=radius).radii == numpy.float32(0.1)).all()
+    with pytest.raises(surfel.InvalidArray, match=r"^radii: found shape \(1,\), expected \(2500,\)"):
+        surfel.Cloud(points, radii=numpy.array([0.1]))

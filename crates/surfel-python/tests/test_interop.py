@@ -79,6 +79,21 @@ def test_pandas_columns_become_scalars():
     assert list(surfel.Cloud(frame, scalars={"depth": z}).scalars) == ["age", "depth"]
 
 
+def test_pandas_columns_that_lack_values_have_nan():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(dict(zip("xyz", hill_points().T)))
+    frame["age"] = pandas.array([None, *range(1, 2500)], dtype="Int64")
+    frame["weight"] = pandas.array([None, *range(1, 2500)], dtype="Float64")
+    frame["name"] = pandas.array(["a"] * 2500, dtype="string")
+    cloud = surfel.Cloud(frame)
+    assert list(cloud.scalars) == ["age", "weight"]
+    for values in (*cloud.scalars.values(), surfel.Cloud(hill_points(), scalars=frame[["age"]]).scalars["age"]):
+        assert numpy.isnan(values[0]) and (values[1:] == numpy.arange(1, 2500)).all()
+    frame["one"] = pandas.array(numpy.ones(2500), dtype="Float64")
+    normals = surfel.Cloud(hill_points(), normals=frame[["age", "weight", "one"]]).normals
+    assert numpy.isnan(normals[0]).any() and (normals[1:, 2] == 1).all()
+
+
 def test_xarray_columns_become_scalars():
     xarray = pytest.importorskip("xarray")
     x, y, z = hill_points().T

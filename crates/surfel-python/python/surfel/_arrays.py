@@ -16,10 +16,17 @@ def as_array(name, values):
     try:
         if hasattr(values, "__dlpack__") and not any(hasattr(values, way) for way in known):
             return numpy.from_dlpack(values)
-        return numpy.asarray(values)
+        return _nan_where_missing(values, numpy.asarray(values))
     except (TypeError, ValueError, BufferError, RuntimeError) as error:
         message = f"{name}: found {_kind(values)} that is no array of this machine's memory: {error}"
         raise InvalidArray(message) from error
+
+
+def contiguous(array, dtype):
+    """The array of this type in rows one after the other, at addresses that the machine reads as such numbers."""
+    import numpy
+
+    return numpy.require(array, dtype, ["C", "A", "E"])
 
 
 def numbers(name, values, shape):
@@ -67,7 +74,7 @@ def classes(values, n_points):
         raise InvalidArray(f"classification: found dtype {array.dtype}, expected integers from 0 to 255")
     if array.size and not 0 <= array.min() <= array.max() <= 255:
         raise InvalidArray(f"classification: found {array.min()} to {array.max()}, expected 0 to 255")
-    return numpy.ascontiguousarray(array, dtype=numpy.uint8)
+    return contiguous(array, numpy.uint8)
 
 
 def indices(name, values, n_columns, limit):
@@ -80,7 +87,7 @@ def indices(name, values, n_columns, limit):
     if array.size and not 0 <= array.min() <= array.max() < limit:
         message = f"{name}: found indices {array.min()} to {array.max()}, expected 0 to {limit - 1}"
         raise InvalidArray(message)
-    return numpy.ascontiguousarray(array, dtype=numpy.uint32)
+    return contiguous(array, numpy.uint32)
 
 
 def colors(values, n_points):
@@ -95,7 +102,7 @@ def colors(values, n_points):
     if array.dtype.kind in "iu" and array.dtype.itemsize > 2 and array.size and 0 <= array.min() and array.max() <= 65535:
         array = array.astype(numpy.uint8 if array.max() <= 255 else numpy.uint16)
     if array.dtype == numpy.uint8:
-        return numpy.ascontiguousarray(array, dtype=numpy.uint16) * numpy.uint16(257)
+        return contiguous(array, numpy.uint16) * numpy.uint16(257)
     if array.dtype.kind == "f":
         # Numbers that are not finite fail here too.
         if array.size and not (0 <= array.min() and array.max() <= 1):
@@ -107,7 +114,18 @@ def colors(values, n_points):
         expected = "integers from 0 to 255 or 65535, or numbers from 0 to 1"
         found = f"{array.min()} to {array.max()}" if array.size and array.dtype.kind in "iu" else "numbers"
         raise InvalidArray(f"colors: found {found} of dtype {array.dtype}, expected {expected}")
-    return numpy.ascontiguousarray(array)
+    return contiguous(array, numpy.uint16)
+
+
+def _nan_where_missing(values, array):
+    """The numbers of columns of pandas that may lack some, which are no numbers of numpy otherwise."""
+    import numpy
+
+    if array.dtype.kind != "O" or not hasattr(values, "to_numpy"):
+        return array
+    types = getattr(values, "dtypes", getattr(values, "dtype", None))
+    kinds = {getattr(one, "kind", "O") for one in (types if hasattr(types, "__iter__") else (types,))}
+    return values.to_numpy("f8", na_value=numpy.nan) if kinds <= set("fiub") else array
 
 
 def _nan_where_masked(values):
@@ -147,7 +165,7 @@ def _contiguous(name, array, codes):
     if array.dtype.kind not in "fiub":
         raise InvalidArray(f"{name}: found dtype {array.dtype}, expected numbers")
     code = array.dtype.str[1:]
-    return numpy.ascontiguousarray(array, dtype=numpy.dtype(code if code in codes else "f8"))
+    return contiguous(array, code if code in codes else "f8")
 
 
 def _kind(values):

@@ -2,7 +2,7 @@
 
 import os
 
-from surfel._arrays import as_array
+from surfel._arrays import as_array, contiguous
 from surfel._errors import InvalidArray
 
 _PACKAGES = "laspy, Open3D, PyVista, trimesh, pandas or xarray"
@@ -121,9 +121,7 @@ def _laspy_crs(header):
 
 
 def _integers(axis):
-    import numpy
-
-    return numpy.ascontiguousarray(axis, dtype=numpy.int32)
+    return contiguous(axis, "i4")
 
 
 def _open3d(cloud):
