@@ -92,6 +92,13 @@ def test_recipes_are_equal_if_all_digits_are(hill):
         Recipe(hill, spp=object())
 
 
+def test_recipes_are_equal_in_any_order_of_keys(hill):
+    first = Recipe(hill, spp=1, sun={"azimuth": 1, "elevation": 2})
+    second = Recipe(hill, sun={"elevation": 2, "azimuth": 1}, spp=1)
+    assert first == second and hash(first) == hash(second)
+    assert first != Recipe(hill, spp=1, sun={"azimuth": 2, "elevation": 1})
+
+
 def test_files_of_keywords_are_named_from_the_root(hill, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     keys = {"environment": pathlib.Path("sky.hdr"), "crop": "area.geojson", "color": "rgb", "up": None}

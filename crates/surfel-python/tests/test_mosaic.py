@@ -108,6 +108,18 @@ def test_the_ranges_of_colours_are_common(survey):
     assert layout(survey, color="elevation", range=(490, 520)).keys["range"] == [490, 520]
 
 
+def test_dicts_leave_what_they_do_not_say_common(survey):
+    """A key of a dict counts as the keyword of its name does."""
+    keys = {"light": ("sun", "sky")}
+    dicts = layout.__wrapped__(survey, **keys, sky={"strength": 2}, sun={"strength": 2})
+    words = layout(survey, **keys, sky_strength=2, sun_strength=2)
+    assert dicts.keys["sky"]["ao_distance"] == words.keys["sky"]["ao_distance"] > 0
+    assert dicts.keys["sky"]["strength"] == dicts.keys["sun"]["strength"] == 2
+    assert dicts.rim == words.rim
+    scenes = [surfel.load(*survey, **found.keys).describe() for found in (dicts, words)]
+    assert scenes[0] == scenes[1]
+
+
 def test_the_legend_has_the_classes_of_all_tiles(tmp_path):
     """The picture is that of all tiles in one scene, whose legend lists the classes of each."""
     tiles = []

@@ -82,7 +82,7 @@ class Layout:
         self.left, self.top = left, top
         self.width = max(columns[1] for columns, _ in self.windows)
         self.height = max(rows[1] for _, rows in self.windows)
-        self.keys = _shared_keys(surveys) | recipes[0].keys | self._camera_keys(surveys)
+        self.keys = _merged(_shared_keys(surveys), recipes[0].keys) | self._camera_keys(surveys)
         self.rim = self._automatic_rim(surveys) if rim is None else float(rim)
         self.regions = self._regions()
 
@@ -169,6 +169,16 @@ def _shared_keys(surveys: list[Any]) -> dict[str, Any]:
     if surveys[0][2] is not None and "range" not in keys:
         keys["range"] = (min(low for low, _ in ranges), max(high for _, high in ranges))
     return keys
+
+
+def _merged(shared: dict[str, Any], keys: dict[str, Any]) -> dict[str, Any]:
+    """The keywords of a recipe over those that are chosen for all; a dict leaves what it does not say as it was chosen."""
+    both = {key: shared[key] | keys[key] for key in shared.keys() & keys.keys() if _are_dicts(shared[key], keys[key])}
+    return shared | keys | both
+
+
+def _are_dicts(*values: Any) -> bool:
+    return all(isinstance(value, dict) for value in values)
 
 
 def _grown(pixels: Any, window: Any, margin: int) -> Any:

@@ -63,7 +63,7 @@ class Recipe:
         return _restored(self.version, tuple(paths), self.keys | _plain(**keys))
 
     def _identity(self) -> str:
-        return json.dumps((self.version, self.paths, sorted(self.keys.items())))
+        return json.dumps((self.version, self.paths, self.keys), sort_keys=True)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Recipe) and self._identity() == other._identity()
