@@ -5,8 +5,8 @@ use crate::scene::{PyScene, check_is_not_empty};
 use crate::work;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use std::sync::{Mutex, PoisonError};
+use pyo3::types::{PyCFunction, PyDict, PyTuple};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 use surfel::description::Invalid;
@@ -20,7 +20,33 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 pub struct PyViewer {
     url: String,
     frame_ancestors: FrameAncestors,
-    running: Mutex<Option<RunningViewer>>,
+    running: Slot,
+}
+
+/// A viewer, until it is stopped.
+type Slot = Arc<Mutex<Option<RunningViewer>>>;
+
+/// The viewers that were started, also those that no variable holds any more.
+static STARTED: Mutex<Vec<Slot>> = Mutex::new(Vec::new());
+
+/// Stops all viewers when the interpreter ends, so that their temporary files go.
+pub fn stop_at_exit(py: Python<'_>) -> PyResult<()> {
+    let stop_all = |arguments: &Bound<'_, PyTuple>, _: Option<&Bound<'_, PyDict>>| {
+        let stop_all = || {
+            let slots = std::mem::take(&mut *lock(&STARTED));
+            let running: Vec<_> = slots.iter().filter_map(|slot| lock(slot).take()).collect();
+            running.into_iter().for_each(|viewer| drop(viewer.stop()));
+        };
+        // Fails in a process that was forked, which has none of their threads.
+        let _ = work::detached(arguments.py(), stop_all);
+    };
+    let stop_all = PyCFunction::new_closure(py, None, None, stop_all)?;
+    py.import("atexit")?.call_method1("register", (stop_all,))?;
+    Ok(())
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[pymethods]
@@ -33,7 +59,7 @@ impl PyViewer {
 
     /// Stops the viewer. Raises `InvalidScene` if its files could not be read.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
-        let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let running = lock(&self.running).take();
         let ended = py.detach(|| running.map_or(Ok(()), RunningViewer::stop));
         ended.map_err(|error| exception(py, "InvalidScene", &error.to_string()))
     }
@@ -43,10 +69,8 @@ impl PyViewer {
     ///
     /// Raises `InvalidScene` if its files could not be read.
     fn wait(&self, py: Python<'_>) -> PyResult<()> {
-        let is_running = || {
-            let running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-            running.as_ref().is_some_and(|running| !running.is_finished())
-        };
+        let is_running =
+            || lock(&self.running).as_ref().is_some_and(|running| !running.is_finished());
         while is_running() {
             match py.check_signals() {
                 Err(raised) if raised.is_instance_of::<PyKeyboardInterrupt>(py) => break,
@@ -123,8 +147,13 @@ pub fn view(
     let running = work::detached(py, || RunningViewer::start(description, port))?
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
     let (url, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());
+    let running = Arc::new(Mutex::new(Some(running)));
+    let mut started = lock(&STARTED);
+    started.retain(|slot| lock(slot).is_some());
+    started.push(running.clone());
+    drop(started);
     if open {
         py.import("webbrowser")?.call_method1("open", (&url,))?;
     }
-    Ok(PyViewer { url, frame_ancestors, running: Mutex::new(Some(running)) })
+    Ok(PyViewer { url, frame_ancestors, running })
 }

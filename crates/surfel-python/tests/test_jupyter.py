@@ -52,6 +52,9 @@ def test_the_widget_allows_the_notebook_that_shows_it(viewer):
     # What the front end sends.
     widget.set_state({"origin": "http://127.0.0.1:8888"})
     assert widget.allowed == "http://127.0.0.1:8888" == policy(viewer)
+    other = _widget_class(anywidget, traitlets)(viewer)
+    other.set_state({"origin": "vscode-webview://1f2e"})
+    assert other.allowed == "" and policy(viewer) == "http://127.0.0.1:8888"
     bundle = viewer._repr_mimebundle_()
     bundle = bundle[0] if isinstance(bundle, tuple) else bundle
     assert "application/vnd.jupyter.widget-view+json" in bundle

@@ -86,3 +86,41 @@ def test_ctrl_c_ends_a_script_that_waits(hill):
     script.send_signal(signal.SIGINT)
     out, err = script.communicate(timeout=60)
     assert (out, err, script.returncode) == ("over\n", "", 0)
+
+
+def test_viewers_end_in_order_with_the_interpreter(hill):
+    """Also one that no variable holds: a handler that was registered before theirs finds them gone."""
+    code = """
+import atexit, sys, urllib.request
+urls = []
+def look():
+    for url in urls:
+        try:
+            urllib.request.urlopen(url)
+            print("open")
+        except OSError:
+            print("closed")
+atexit.register(look)
+import surfel
+scene = surfel.load(sys.argv[1])
+held = surfel.view(scene)
+urls += [held.url, surfel.view(scene).url]
+urllib.request.urlopen(urls[1])
+"""
+    done = subprocess.run([sys.executable, "-c", code, hill], capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("closed\nclosed\n", "")
+
+
+def test_scenes_of_arrays_have_names(points):
+    """A page that connects again keeps its view only if these are those of before."""
+
+    def name(n_points, **keys):
+        scene = surfel.Scene()
+        scene.add(surfel.Cloud(points[:n_points]), **keys)
+        with surfel.view(scene) as viewer:
+            while b"ready" not in fetch(viewer.url + "healthz"):
+                time.sleep(0.05)
+            return json.loads(fetch(viewer.url + "stats"))["info"]["name"]
+
+    assert name(2500, name="hill") == "hill (2500 points)"
+    assert len({name(2500), name(2000), name(2500, name="hill")}) == 3

@@ -1,5 +1,7 @@
 """The viewer's page in a cell of a notebook."""
 
+from surfel._errors import InvalidSetting
+
 HEIGHT_PX = 480
 
 #: The page's origin is allowed first, so that the server lets no other page frame it.
@@ -12,13 +14,15 @@ function render({ model, el }) {
   const link = document.createElement("a");
   Object.assign(link, { href: model.get("link"), target: "_blank", textContent: model.get("link") });
   const show = () => {
-    if (model.get("allowed") === location.origin) frame.src = model.get("link");
+    if (model.get("allowed") !== location.origin) return;
+    frame.src = model.get("link");
+    el.prepend(frame);
   };
   model.on("change:allowed", show);
   model.set("origin", location.origin);
   model.save_changes();
+  el.append(link);
   show();
-  el.append(frame, link);
   return () => model.off("change:allowed", show);
 }
 export default { render };
@@ -51,7 +55,11 @@ def _widget_class(anywidget, traitlets):
 
         @traitlets.observe("origin")
         def _allow(self, change):
-            self._viewer.allow_frame(change["new"])
+            try:
+                self._viewer.allow_frame(change["new"])
+            except InvalidSetting:
+                # A notebook without an address of the web, as that of VS Code, shows the link alone.
+                return
             self.allowed = change["new"]
 
     return ViewerWidget
