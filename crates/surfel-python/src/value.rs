@@ -9,13 +9,20 @@ use std::path::{Path, absolute};
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 
+/// Maximum number of levels of values that a keyword may have, half of those that a JSON file may have.
+const MAX_DEPTH: usize = 64;
+
 /// Reads keywords as a table of keys. One that is a word of the language, as `class`, has an underscore at its end.
 pub fn table(keys: Option<&Bound<'_, PyDict>>) -> PyResult<Map<String, Value>> {
+    table_within(keys, MAX_DEPTH)
+}
+
+fn table_within(keys: Option<&Bound<'_, PyDict>>, depth: usize) -> PyResult<Map<String, Value>> {
     let mut table = Map::new();
     for (key, value) in keys.into_iter().flatten() {
         let name: String = key.extract()?;
         let key = name.strip_suffix('_').unwrap_or(&name);
-        if table.insert(key.to_owned(), to_value(key, &value)?).is_some() {
+        if table.insert(key.to_owned(), value_within(key, &value, depth)?).is_some() {
             let message = format!("is given twice, also as {key}_");
             return Err(invalid_setting(value.py(), Invalid::at(key, message)));
         }
@@ -90,7 +97,16 @@ fn name_from_root(path: &str, value: &mut Value) {
 }
 
 /// Converts a value; `key` is the path that an error names.
+///
+/// # Errors
+///
+/// Fails for what no scene file can hold, and for values within values without end, as a list that holds itself.
 pub fn to_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    value_within(key, value, MAX_DEPTH)
+}
+
+/// Converts a value that may hold others, `depth` levels of them.
+fn value_within(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if value.is_none() {
         return Ok(Value::Null);
     }
@@ -107,22 +123,36 @@ pub fn to_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(Value::String(text.to_str()?.to_owned()));
     }
     if let Ok(dict) = value.cast::<PyDict>() {
-        return Ok(Value::Object(table(Some(dict)).map_err(|error| within(key, value, error))?));
+        let table = table_within(Some(dict), deeper(key, value, depth)?);
+        return Ok(Value::Object(table.map_err(|error| within(key, value, error))?));
     }
     // Paths, dates, arrays and numbers of numpy: each says itself what it is.
     for method in ["__fspath__", "isoformat", "tolist"] {
         if value.hasattr(method)? {
-            return to_value(key, &value.call_method0(method)?);
+            return value_within(key, &value.call_method0(method)?, deeper(key, value, depth)?);
         }
     }
     if let Ok(mapping) = value.cast::<PyMapping>() {
         let dict = PyDict::new(value.py());
         dict.update(mapping)?;
-        return to_value(key, &dict);
+        return value_within(key, &dict, depth);
     }
     let items = value.try_iter().map_err(|error| within(key, value, error))?;
-    let items = items.enumerate().map(|(i, item)| to_value(&format!("{key}[{i}]"), &item?));
-    Ok(Value::Array(items.collect::<PyResult<_>>()?))
+    let depth = deeper(key, value, depth)?;
+    let item_of = |(i, item): (usize, PyResult<Bound<'_, PyAny>>)| {
+        value_within(&format!("{key}[{i}]"), &item?, depth)
+    };
+    Ok(Value::Array(items.enumerate().map(item_of).collect::<PyResult<_>>()?))
+}
+
+/// Returns the number of levels of values that a value within a value may hold.
+fn deeper(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<usize> {
+    depth.checked_sub(1).ok_or_else(|| {
+        // The path has a part for each level.
+        let key = key.split(['[', '.']).next().unwrap_or(key);
+        let message = format!("holds more than {MAX_DEPTH} levels of lists and dicts");
+        invalid_setting(value.py(), Invalid::at(key, message))
+    })
 }
 
 fn integer(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {

@@ -116,3 +116,14 @@ def test_keys_that_are_words_of_the_language_end_with_an_underscore(points, tmp_
     assert scene.describe()["class"] == surfel.load(tmp_path / "hill.laz", **{"class": 6}).describe()["class"]
     with pytest.raises(surfel.InvalidSetting, match="^class: is given twice, also as class_"):
         surfel.load(tmp_path / "hill.laz", class_=6, **{"class": 6})
+
+
+def test_values_that_hold_themselves_are_refused():
+    views, sun, deep = [], {}, 1
+    views.append(views)
+    sun["azimuth"] = sun
+    for _ in range(100):
+        deep = numpy.array([deep], dtype=object)
+    for keys in ({"views": views}, {"sun": sun}, {"views": deep}):
+        with pytest.raises(surfel.InvalidSetting, match="^(views|azimuth): holds more than 64 levels of lists and dicts"):
+            surfel.Scene(**keys)
