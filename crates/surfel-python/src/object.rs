@@ -4,10 +4,11 @@ use crate::cloud::{PyCloud, PyMesh, mesh_columns, to_cloud};
 use crate::errors::{invalid_array, invalid_setting, to_exception};
 use crate::paths::file_name;
 use crate::value::{table, to_value};
+use crate::work;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 use surfel::memory_files::MemoryContent;
@@ -46,6 +47,21 @@ impl NewObject {
         Ok(Self { content: Some(content(what)?), table })
     }
 
+    /// Looks at the files of the object as the last one of a description.
+    ///
+    /// # Errors
+    ///
+    /// Fails as `added_to`, and for files that are missing or none that surfel reads.
+    pub fn inspect(self, py: Python<'_>, description: &SceneDescription) -> PyResult<()> {
+        let description = self.added_to(py, description)?;
+        let added = description.objects.last().into_iter().flat_map(|object| &object.files);
+        let files: Vec<&PathBuf> =
+            added.filter(|file| !description.memory.contains(file)).collect();
+        let look_at = |file: &&PathBuf| surfel_formats::inspect(file).map(drop);
+        let inspected = work::detached(py, || files.iter().try_for_each(look_at))?;
+        inspected.map_err(|error| to_exception(py, &error.into()))
+    }
+
     /// Returns a description with the object at its end.
     pub fn added_to(
         mut self,
@@ -75,10 +91,6 @@ impl NewObject {
         }
         let added = description.add_object(&self.table, Path::new(""));
         added.map_err(|error| invalid(py, error))?;
-        let added = description.objects.last().into_iter().flat_map(|object| &object.files);
-        for file in added.filter(|file| !description.memory.contains(file)) {
-            surfel_formats::inspect(file).map_err(|error| to_exception(py, &error.into()))?;
-        }
         Ok(description)
     }
 }

@@ -131,6 +131,9 @@ impl PyScene {
     /// the world's coordinates, or to those of the parent. Other keywords are keys of objects in scene files, as
     /// `translate`, `rotate`, `scale`, `color`, `surface`, `visible`.
     ///
+    /// The next picture reads and prepares the whole scene again, also the files of `surfel.load`: add everything to a
+    /// `Scene()` before the first one.
+    ///
     /// Raises `InvalidSetting`, `InvalidArray`, `MissingFile`.
     #[pyo3(signature = (geometry, *, name = None, material = None, transform = None, **keys))]
     fn add(
@@ -143,6 +146,7 @@ impl PyScene {
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<usize> {
         let object = NewObject::new(geometry, name, material, transform, keys)?;
+        object.clone().inspect(py, &self.description())?;
         loop {
             // No lock is held while the interpreter may run another thread, which could wait for it.
             let before = self.description();
@@ -459,7 +463,8 @@ pub fn _unread(
     let mut description = scene_of_text(py, _scene.unwrap_or("{}"))?;
     for path in file_names("surfel.load", paths)? {
         if is_scene_file(&path) {
-            let read = SceneDescription::read(&path).map_err(|error| to_exception(py, &error))?;
+            let read = work::detached(py, || SceneDescription::read(&path))?;
+            let read = read.map_err(|error| to_exception(py, &error))?;
             description.overlay(read);
         } else {
             description.files.push(path);

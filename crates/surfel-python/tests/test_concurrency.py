@@ -216,7 +216,7 @@ def outcome(queue, work):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-@pytest.mark.parametrize("kind", ["cloud", "mesh", "rays", "view"])
+@pytest.mark.parametrize("kind", ["cloud", "mesh", "rays", "view", "file"])
 def test_forked_processes_convert_no_arrays_and_show_no_viewer(hill, kind):
     # So many points are converted on several threads.
     many = hill_points(450)
@@ -227,6 +227,8 @@ def test_forked_processes_convert_no_arrays_and_show_no_viewer(hill, kind):
         "mesh": lambda: surfel.Mesh(many, [[0, 1, 2]]),
         "rays": lambda: scene.cast_rays(numpy.hstack([many, many])),
         "view": lambda: surfel.view(scene),
+        # Files are looked at without the interpreter, too.
+        "file": lambda: surfel.Scene().add(hill),
     }
     assert "was forked" in forked(outcome, work[kind])
 
