@@ -1,7 +1,7 @@
 //! The structures of surfaces that are zeros of a field, as vectors of four words behind the nodes of the points' tree.
 
 use crate::numbers::VECTOR_BYTES;
-use crate::payload::Part;
+use crate::payload::PayloadPart;
 use std::sync::OnceLock;
 use surfel_core::flat::{CellCorners, CellPlane, FieldTree, FlatCloud, Octree, OctreeNode};
 use surfel_core::math::{Aabb, Vec3};
@@ -20,7 +20,7 @@ pub const CORNER_CELL_VECTORS: usize = 3;
 pub const KD_HEAD_VECTORS: usize = 3;
 
 /// Returns the structure of a cloud's surface; nothing if it has none beside the points' tree.
-pub fn structure(cloud: &FlatCloud) -> Vec<Part<'_>> {
+pub fn structure(cloud: &FlatCloud) -> Vec<PayloadPart<'_>> {
     match cloud.surface {
         SurfaceKind::Octree | SurfaceKind::OctreeSplat => octree(&cloud.octree),
         SurfaceKind::Implicit => kd_tree(&cloud.field),
@@ -28,16 +28,16 @@ pub fn structure(cloud: &FlatCloud) -> Vec<Part<'_>> {
     }
 }
 
-fn octree(octree: &Octree) -> Vec<Part<'_>> {
+fn octree(octree: &Octree) -> Vec<PayloadPart<'_>> {
     let (nodes, planes, all_corners) = (octree.nodes(), octree.planes(), octree.all_corners());
     let first_cell = (OCTREE_HEAD_VECTORS + nodes.len()) as u32;
     let cube = octree.cube().unwrap_or(Aabb { min: Vec3::ZERO, max: Vec3::ZERO });
     let head: [Vector; OCTREE_HEAD_VECTORS] = [corner(&cube, cube.size().x), [first_cell, 0, 0, 0]];
     vec![
-        Part::records(1, move |_| head),
-        Part::records(nodes.len(), move |i| node(&nodes[i])),
-        Part::records(planes.len(), move |i| plane(&planes[i])),
-        Part::records(all_corners.len(), move |i| corners(&all_corners[i])),
+        PayloadPart::records(1, move |_| head),
+        PayloadPart::records(nodes.len(), move |i| node(&nodes[i])),
+        PayloadPart::records(planes.len(), move |i| plane(&planes[i])),
+        PayloadPart::records(all_corners.len(), move |i| corners(&all_corners[i])),
     ]
 }
 
@@ -63,7 +63,7 @@ fn corners(corners: &CellCorners) -> [Vector; CORNER_CELL_VECTORS] {
     [values, [a, b, c, d], [e, f, corners.slot, 0]]
 }
 
-fn kd_tree(tree: &FieldTree) -> Vec<Part<'_>> {
+fn kd_tree(tree: &FieldTree) -> Vec<PayloadPart<'_>> {
     let (n_nodes, leaf_starts, entries) = (tree.n_nodes(), tree.leaf_starts(), tree.entries());
     let n_entries = entries.blocks.len();
     let first_leaf = KD_HEAD_VECTORS + n_vectors(2 * n_nodes);
@@ -84,12 +84,12 @@ fn kd_tree(tree: &FieldTree) -> Vec<Part<'_>> {
         [entries.blocks[i], lanes]
     };
     vec![
-        Part::records(1, move |_| head),
-        Part::records(n_nodes, node),
+        PayloadPart::records(1, move |_| head),
+        PayloadPart::records(n_nodes, node),
         padding(2 * n_nodes),
-        Part::Bytes(bytemuck::cast_slice(leaf_starts)),
+        PayloadPart::Bytes(bytemuck::cast_slice(leaf_starts)),
         padding(leaf_starts.len()),
-        Part::records(n_entries, entry),
+        PayloadPart::records(n_entries, entry),
         padding(2 * n_entries),
     ]
 }
@@ -100,9 +100,9 @@ fn n_vectors(n_words: usize) -> usize {
 }
 
 /// Returns the zeros behind `n_words` in their last vector.
-fn padding<'a>(n_words: usize) -> Part<'a> {
+fn padding<'a>(n_words: usize) -> PayloadPart<'a> {
     const ZEROS: &[u8] = &[0; VECTOR_BYTES];
-    Part::Bytes(&ZEROS[..VECTOR_BYTES * n_vectors(n_words) - 4 * n_words])
+    PayloadPart::Bytes(&ZEROS[..VECTOR_BYTES * n_vectors(n_words) - 4 * n_words])
 }
 
 #[cfg(test)]

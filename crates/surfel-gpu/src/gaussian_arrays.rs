@@ -1,7 +1,7 @@
 //! The trained Gaussians of all clouds of a scene in one tree of a device: rays composite them together.
 
 use crate::numbers::VECTOR_BYTES;
-use crate::payload::{Part, Payload};
+use crate::payload::{Payload, PayloadPart};
 use std::sync::Arc;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGaussians, FlatGeometry, GaussianBlock};
@@ -62,16 +62,16 @@ pub fn gaussian_blocks(geometries: &[Arc<FlatGeometry>]) -> Payload<'_> {
     Payload(gaussian_clouds(geometries).map(|(_, gaussians)| blocks(gaussians)).collect())
 }
 
-fn nodes(gaussians: &FlatGaussians, root_node: u32) -> Part<'_> {
+fn nodes(gaussians: &FlatGaussians, root_node: u32) -> PayloadPart<'_> {
     let nodes = gaussians.nodes();
-    Part::nodes(nodes.len(), move |i| {
+    PayloadPart::nodes(nodes.len(), move |i| {
         let mut node: BvhNode = nodes[i];
         node.first_node = node.first_node.wrapping_add(root_node);
         node
     })
 }
 
-fn blocks(gaussians: &FlatGaussians) -> Part<'_> {
+fn blocks(gaussians: &FlatGaussians) -> PayloadPart<'_> {
     let (blocks, coefficients) = (gaussians.blocks(), gaussians.coefficient_bits());
     let n_coefficients = 3 * gaussians.n_harmonics() * LANES;
     let lay_out = move |i: usize, words: &mut [u32]| {
@@ -81,7 +81,7 @@ fn blocks(gaussians: &FlatGaussians) -> Part<'_> {
         let coefficients = &coefficients[n_coefficients * i..][..n_coefficients];
         of_coefficients.copy_from_slice(bytemuck::cast_slice(coefficients));
     };
-    Part::Records {
+    PayloadPart::Records {
         n_records: blocks.len(),
         n_words: block_vectors(gaussians) as usize * VECTOR_BYTES / 4,
         lay_out: Box::new(lay_out),

@@ -1,7 +1,7 @@
 //! Blocks of triangles with the attributes of their vertices, in the order in which kernels read them.
 
 use crate::numbers::attribute;
-use crate::payload::Part;
+use crate::payload::PayloadPart;
 use surfel_core::bvh::NO_PRIMITIVE;
 use surfel_core::flat::{FlatMesh, TriangleBlock};
 use surfel_core::math::{LANES, Vec4};
@@ -67,7 +67,7 @@ pub fn block_vectors(mesh: &FlatMesh) -> u32 {
 }
 
 /// Returns the blocks of a mesh, each followed by the attributes of its corners.
-pub fn mesh_blocks(mesh: &FlatMesh) -> Part<'_> {
+pub fn mesh_blocks(mesh: &FlatMesh) -> PayloadPart<'_> {
     const BLOCK_WORDS: usize = size_of::<TriangleBlock>() / 4;
     let present: Vec<_> = columns(mesh).into_iter().filter(|column| column.is_present).collect();
     let lay_out = move |block_idx: usize, words: &mut [u32]| {
@@ -82,7 +82,7 @@ pub fn mesh_blocks(mesh: &FlatMesh) -> Part<'_> {
             rest = behind;
         }
     };
-    Part::Records {
+    PayloadPart::Records {
         n_records: mesh.triangles.blocks.len(),
         n_words: block_vectors(mesh) as usize * WORDS_PER_VECTOR,
         lay_out: Box::new(lay_out),

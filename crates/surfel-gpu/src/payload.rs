@@ -10,10 +10,10 @@ const WORDS_AT_ONCE: usize = 512;
 
 /// The contents of an array: parts, one behind the other.
 #[derive(Default)]
-pub struct Payload<'a>(pub Vec<Part<'a>>);
+pub struct Payload<'a>(pub Vec<PayloadPart<'a>>);
 
 /// A part of the contents of an array.
-pub enum Part<'a> {
+pub enum PayloadPart<'a> {
     /// Bytes as they are.
     Bytes(&'a [u8]),
     /// Records of the same size.
@@ -40,7 +40,7 @@ struct PaddedNode {
 
 const _: () = assert!(size_of::<PaddedNode>() == VECTOR_BYTES * NODE_VECTORS);
 
-impl<'a> Part<'a> {
+impl<'a> PayloadPart<'a> {
     /// Returns records of words.
     pub fn records<T: NoUninit>(n: usize, record: impl Fn(usize) -> T + Sync + 'a) -> Self {
         Self::Records {
@@ -95,7 +95,7 @@ impl<'a> Part<'a> {
 impl Payload<'_> {
     /// Returns the number of bytes.
     pub fn len(&self) -> usize {
-        self.0.iter().map(Part::len).sum()
+        self.0.iter().map(PayloadPart::len).sum()
     }
 
     /// Copies bytes from `offset` on, as many as `target` holds.
@@ -132,11 +132,11 @@ mod tests {
         let bytes: Vec<u8> = (0..24).collect();
         let long = |i: usize, words: &mut [u32]| words[..600].fill(i as u32);
         let payload = Payload(vec![
-            Part::records(0, |i| i as u32),
-            Part::records(1000, |i| [i as u32, 7, i as u32 + 1]),
-            Part::Bytes(&bytes),
-            Part::Bytes(&[]),
-            Part::Records { n_records: 3, n_words: 601, lay_out: Box::new(long) },
+            PayloadPart::records(0, |i| i as u32),
+            PayloadPart::records(1000, |i| [i as u32, 7, i as u32 + 1]),
+            PayloadPart::Bytes(&bytes),
+            PayloadPart::Bytes(&[]),
+            PayloadPart::Records { n_records: 3, n_words: 601, lay_out: Box::new(long) },
         ]);
         let mut expected: Vec<u8> =
             (0..1000u32).flat_map(|i| [i, 7, i + 1]).flat_map(u32::to_ne_bytes).collect();
@@ -155,7 +155,7 @@ mod tests {
     fn nodes_are_padded() {
         let mut node = BvhNode::zeroed();
         bytemuck::bytes_of_mut(&mut node).fill(5);
-        let bytes = bytes_of(&Payload(vec![Part::nodes(2, |_| node)]));
+        let bytes = bytes_of(&Payload(vec![PayloadPart::nodes(2, |_| node)]));
         let padded = [[5; 72].as_slice(), &[0; 8]].concat();
         assert!(bytes == [padded.as_slice(), &padded].concat());
     }

@@ -2,7 +2,7 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::payload::{Part, Payload};
+use crate::payload::{Payload, PayloadPart};
 use crate::threads::for_each;
 use surfel_core::progress::Progress;
 
@@ -91,7 +91,7 @@ pub fn write(
     progress: &dyn Progress,
 ) -> surfel_core::Result<()> {
     let mut transfer = Transfer::new(gpu, progress);
-    transfer.fill(buffer, &Payload(vec![Part::Bytes(bytes)]), 0)?;
+    transfer.fill(buffer, &Payload(vec![PayloadPart::Bytes(bytes)]), 0)?;
     Ok(transfer.finish()?)
 }
 
@@ -139,7 +139,10 @@ mod tests {
             expected.resize(expected.len().next_multiple_of(NODE_BYTES), 0);
         }
         expected.extend_from_slice(&bytes);
-        let payload = Payload(vec![Part::nodes(nodes.len(), |i| nodes[i]), Part::Bytes(&bytes)]);
+        let payload = Payload(vec![
+            PayloadPart::nodes(nodes.len(), |i| nodes[i]),
+            PayloadPart::Bytes(&bytes),
+        ]);
         assert_eq!(payload.len(), expected.len());
         // The second array begins amid a node, the third one amid the bytes.
         let starts = [0, 16 * 1001, 400_000 * NODE_BYTES + 32];

@@ -7,7 +7,7 @@ use crate::gaussian_arrays::{gaussian_blocks, gaussian_clouds, gaussian_nodes};
 use crate::kernels::{Kernels, bind};
 use crate::mesh_blocks::mesh_blocks;
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
-use crate::payload::{Part, Payload};
+use crate::payload::{Payload, PayloadPart};
 use crate::transfer::{MAX_STAGING_BYTES, Transfer};
 use crate::unsupported::trees;
 use std::collections::{BTreeMap, BTreeSet};
@@ -247,8 +247,8 @@ impl TreeContents<'_> {
 }
 
 /// Returns the contents of a tree with these nodes and blocks.
-fn tree<'a>(nodes: &'a [BvhNode], blocks: Part<'a>) -> TreeContents<'a> {
-    let nodes = Part::nodes(nodes.len(), move |i| nodes[i]);
+fn tree<'a>(nodes: &'a [BvhNode], blocks: PayloadPart<'a>) -> TreeContents<'a> {
+    let nodes = PayloadPart::nodes(nodes.len(), move |i| nodes[i]);
     TreeContents { nodes: Payload(vec![nodes]), blocks: Payload(vec![blocks]) }
 }
 
@@ -257,7 +257,7 @@ fn tree_contents(geometry: &FlatGeometry) -> [TreeContents<'_>; 3] {
     match geometry {
         FlatGeometry::Cloud(cloud) => {
             let mut found = trees(cloud).map(|(_, points)| {
-                tree(&points.nodes, Part::Bytes(bytemuck::cast_slice(&points.blocks)))
+                tree(&points.nodes, PayloadPart::Bytes(bytemuck::cast_slice(&points.blocks)))
             });
             found[0].nodes.0.extend(structure(cloud));
             found

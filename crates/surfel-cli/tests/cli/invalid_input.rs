@@ -292,7 +292,7 @@ fn devices_are_not_replaced_by_files() {
     for (command, name) in [("prepare", "full.ply"), ("render", "full.png")] {
         let full = folder.path(name);
         std::os::unix::fs::symlink("/dev/full", &full).unwrap();
-        let text = fail(&[command, &cloud, "-o", &full], 1);
+        let text = fail(&[command, &cloud, "-o", &full], 2);
         assert!(text.contains(name) && text.contains("device"), "{text}");
         assert_eq!(fs::read_link(&full).unwrap().to_str(), Some("/dev/full"));
     }
