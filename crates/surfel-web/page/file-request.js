@@ -3,8 +3,8 @@
 import { duration } from './format.js';
 
 /**
- * The requests of a part of the page, one at a time. `bar` shows their progress and `note` tells about them;
- * `suit(isRunning)` suits the other controls to them. `link`, if there is one, leads to the file.
+ * The requests of a part of the page, one at a time. `bar` shows their progress, and `note` what came of them;
+ * `onRunningChanged(isRunning)` is called when one begins or ends. `link`, if there is one, leads to the file.
  */
 export class FileRequest {
   #viewer;
@@ -27,19 +27,19 @@ export class FileRequest {
     this.#abort?.abort();
   }
 
-  /** Takes the link and what was told away. */
+  /** Hides the link and the note. */
   forget() {
     this.#hideLink();
-    this.tell('');
+    this.report('');
   }
 
-  /** Tells a text, which no request has to do with. */
-  tell(text) {
+  /** Shows a text as the note. */
+  report(text) {
     this.#show(false, text);
   }
 
   /**
-   * Sends a message. `work` is what the server does, as in `Rendering, 3 s left`, and `first` what is told before its
+   * Sends a message. `work` is what the server does, as in `Rendering, 3 s left`, and `first` the note before its
    * first progress. `finish` gets the answer and returns the text that stays.
    */
   async run(message, { work, first = work }, finish) {
@@ -53,9 +53,9 @@ export class FileRequest {
       note.textContent = typeof left_secs === 'number' ? `${work}, ${duration(left_secs)} left` : work;
     };
     try {
-      this.tell(finish(await this.#viewer.request(message, { progress, abort: this.#abort.signal })));
+      this.report(finish(await this.#viewer.request(message, { progress, abort: this.#abort.signal })));
     } catch (error) {
-      this.tell(error.message === 'cancelled' ? 'Cancelled.' : error.message);
+      this.report(error.message === 'cancelled' ? 'Cancelled.' : error.message);
     }
     this.#abort = null;
   }
@@ -69,10 +69,10 @@ export class FileRequest {
   }
 
   #show(isRunning, text) {
-    const { bar, note, suit } = this.#parts;
+    const { bar, note, onRunningChanged } = this.#parts;
     bar.hidden = !isRunning;
     note.textContent = text;
-    suit(isRunning);
+    onRunningChanged(isRunning);
   }
 
   #hideLink() {

@@ -23,7 +23,7 @@ export function setUpMovieExport(viewer, sceneFile) {
     element('div', { class: 'chips' }, start, cancel, link, sceneFile), bar, note);
   let isEmpty = true;
 
-  const request = new FileRequest(viewer, { bar, note, link, suit: (isWriting) => {
+  const request = new FileRequest(viewer, { bar, note, link, onRunningChanged: (isWriting) => {
     cancel.hidden = !isWriting;
     start.disabled = isWriting || isEmpty;
   } });

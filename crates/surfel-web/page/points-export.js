@@ -18,7 +18,7 @@ export function setUpPointsExport(viewer, dialog) {
   const part = element('section', { class: 'points-export' },
     element('h3', {}, 'Points that are shown'), element('div', { class: 'chips' }, ...buttons, cancel, link), bar, note);
 
-  const request = new FileRequest(viewer, { bar, note, link, suit: (isWriting) => {
+  const request = new FileRequest(viewer, { bar, note, link, onRunningChanged: (isWriting) => {
     cancel.hidden = !isWriting;
     for (const button of buttons) button.disabled = isWriting;
   } });

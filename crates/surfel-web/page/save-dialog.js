@@ -25,7 +25,7 @@ export function setUpSaveDialog(viewer) {
     onclick: () => { [width.value, height.value] = sizeOf(viewer.size); },
   }, name)));
 
-  const request = new FileRequest(viewer, { bar, note, suit: (isSaving) => {
+  const request = new FileRequest(viewer, { bar, note, onRunningChanged: (isSaving) => {
     form.classList.toggle('is-saving', isSaving);
     start.disabled = isSaving;
   } });
@@ -35,7 +35,7 @@ export function setUpSaveDialog(viewer) {
     const size = { width: width.valueAsNumber, height: height.valueAsNumber };
     const maxPixels = viewer.info.limits.max_save_pixels;
     if (maxPixels < size.width * size.height) {
-      request.tell(`The server saves pictures of up to ${Math.round(maxPixels / 1e6)} million pixels.`);
+      request.report(`The server saves pictures of up to ${Math.round(maxPixels / 1e6)} million pixels.`);
       return;
     }
     await request.run({ type: 'save', ...size }, { work: 'Rendering' }, ({ blob }) => {
@@ -52,7 +52,7 @@ export function setUpSaveDialog(viewer) {
 
   return () => {
     [width.value, height.value] = PRESETS.window(viewer.size);
-    request.tell('');
+    request.report('');
     dialog.showModal();
   };
 }
