@@ -73,7 +73,7 @@ fn source_index(trees: &SceneTrees, instance: &Instance, primitive_idx: u32) -> 
     indices.get(primitive_idx as usize).map(|index| *index as usize)
 }
 
-/// Returns the cloud of an instance as it was read; none of a sequence, whose other files are read anew for each time.
+/// Returns the cloud of an instance as it was read; none of a sequence, of which one file is in memory at a time.
 fn source<'l>(loaded: &'l LoadedScene, instance: &Instance) -> Option<&'l PointCloud> {
     let geometry = instance.graph_geometry_idx as usize;
     match loaded.graph.geometries.get(geometry)? {
