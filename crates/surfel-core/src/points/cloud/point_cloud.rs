@@ -1,6 +1,7 @@
 //! Point clouds as columns of equal length, with positions relative to a double-precision origin.
 
 use super::deformation::{Morph, Skin, pick};
+use super::kept_points::KeptPoints;
 use super::scan_station::{STATION, ScanStation};
 use crate::error::{Error, Result};
 use crate::math::{Aabb, DVec3, Vec3, median};
@@ -203,32 +204,35 @@ impl PointCloud {
 
     /// Drops the points from `start` on for which `keep` is false, in place.
     pub fn retain_from(&mut self, start: usize, keep: &[bool]) {
-        retain(&mut self.positions, start, keep);
-        self.normals.iter_mut().for_each(|column| retain(column, start, keep));
-        self.radii.iter_mut().for_each(|column| retain(column, start, keep));
-        self.colors.iter_mut().for_each(|column| retain(column, start, keep));
-        self.intensity.iter_mut().for_each(|column| retain(column, start, keep));
-        self.classification.iter_mut().for_each(|column| retain(column, start, keep));
-        self.source_indices.iter_mut().for_each(|column| retain(column, start, keep));
-        for scalar in &mut self.scalars {
-            match &mut scalar.values {
-                Values::U8(column) => retain(column, start, keep),
-                Values::U16(column) => retain(column, start, keep),
-                Values::I32(column) => retain(column, start, keep),
-                Values::F32(column) => retain(column, start, keep),
-                Values::F64(column) => retain(column, start, keep),
+        let kept = KeptPoints::new(start, keep);
+        rayon::scope(|scope| {
+            kept.retain_in(scope, &mut self.positions);
+            kept.retain_in(scope, self.normals.as_mut());
+            kept.retain_in(scope, self.radii.as_mut());
+            kept.retain_in(scope, self.colors.as_mut());
+            kept.retain_in(scope, self.intensity.as_mut());
+            kept.retain_in(scope, self.classification.as_mut());
+            kept.retain_in(scope, self.source_indices.as_mut());
+            for scalar in &mut self.scalars {
+                match &mut scalar.values {
+                    Values::U8(column) => kept.retain_in(scope, column),
+                    Values::U16(column) => kept.retain_in(scope, column),
+                    Values::I32(column) => kept.retain_in(scope, column),
+                    Values::F32(column) => kept.retain_in(scope, column),
+                    Values::F64(column) => kept.retain_in(scope, column),
+                }
             }
-        }
-        for Morph { positions, normals, tangents, radii } in &mut self.morphs {
-            retain(positions, start, keep);
-            normals.iter_mut().for_each(|column| retain(column, start, keep));
-            tangents.iter_mut().for_each(|column| retain(column, start, keep));
-            radii.iter_mut().for_each(|column| retain(column, start, keep));
-        }
-        if let Some(Skin { joints, weights }) = &mut self.skin {
-            retain(joints, start, keep);
-            retain(weights, start, keep);
-        }
+            for Morph { positions, normals, tangents, radii } in &mut self.morphs {
+                kept.retain_in(scope, positions);
+                kept.retain_in(scope, normals.as_mut());
+                kept.retain_in(scope, tangents.as_mut());
+                kept.retain_in(scope, radii.as_mut());
+            }
+            if let Some(Skin { joints, weights }) = &mut self.skin {
+                kept.retain_in(scope, joints);
+                kept.retain_in(scope, weights);
+            }
+        });
     }
 
     /// Returns an origin for points at these world positions: their median, rounded to whole units.
@@ -250,21 +254,6 @@ impl PointCloud {
         }
         self.origin = origin;
     }
-}
-
-/// Drops the entries from `start` on for which `keep` is false; those that are kept move in runs.
-fn retain<T: Copy>(column: &mut Vec<T>, start: usize, keep: &[bool]) {
-    let (mut at, mut end) = (start, start);
-    for run in keep.chunk_by(|a, b| a == b) {
-        if run[0] {
-            if end != at {
-                column.copy_within(at..at + run.len(), end);
-            }
-            end += run.len();
-        }
-        at += run.len();
-    }
-    column.truncate(end);
 }
 
 impl AsRef<PointCloud> for PointCloud {
