@@ -1,4 +1,4 @@
-//! Numbers and lengths in sentences for the user.
+//! Numbers, lengths and cut texts in sentences for the user.
 
 use std::fmt::Display;
 
@@ -6,6 +6,14 @@ use std::fmt::Display;
 pub fn counted<N: Display + From<u8> + PartialEq>(n: N, thing: &str) -> String {
     let ending = if n == N::from(1) { "" } else { "s" };
     format!("{n} {thing}{ending}")
+}
+
+/// Cuts a text, which may be megabytes long, to so many characters for a message.
+pub fn shorten(text: &str, max_chars: usize) -> String {
+    match text.char_indices().nth(max_chars) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
 }
 
 /// Formats a length with three significant digits, as 0.459, 7.63 or 4120.
@@ -22,7 +30,7 @@ pub fn format_length(length: f32) -> String {
 
 #[cfg(test)]
 mod tests {
-    //! One, none and many; lengths of all sizes.
+    //! One, none and many; cut texts; lengths of all sizes.
 
     use super::*;
 
@@ -30,6 +38,12 @@ mod tests {
     fn one_thing_is_singular() {
         let counts = [0, 1, 2].map(|n| counted(n, "point"));
         assert_eq!(counts, ["0 points", "1 point", "2 points"]);
+    }
+
+    #[test]
+    fn long_texts_are_cut_between_characters() {
+        let cut = ["", "höhe", "höhen"].map(|text| shorten(text, 4));
+        assert_eq!(cut, ["", "höhe", "höhe..."]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 use std::io;
-use surfel_core::words::counted;
+use surfel_core::words::{self, counted};
 
 /// The error of an operation on a file; its message names the file and gives advice.
 #[derive(Debug, thiserror::Error)]
@@ -187,13 +187,10 @@ impl Error {
     }
 }
 
-/// Truncates a text of a file, which may be megabytes long, for a message.
+/// Cuts a text of a file for a message.
 pub(crate) fn shorten(text: &str) -> String {
     const MAX_CHARS: usize = 60;
-    match text.char_indices().nth(MAX_CHARS) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.into(),
-    }
+    words::shorten(text, MAX_CHARS)
 }
 
 /// Returns the number of points that a file claims, as the subject of a sentence.

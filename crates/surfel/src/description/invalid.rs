@@ -3,6 +3,7 @@
 use serde_json::Value;
 use std::fmt;
 use std::path::PathBuf;
+use surfel_core::words::shorten;
 
 /// A key or value of a description that is not valid, from whichever door it came.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,14 +18,8 @@ pub struct Invalid {
     pub message: String,
 }
 
-/// Returns a text that fits into a message.
-fn shorten(text: &str) -> String {
-    const MAX_LENGTH: usize = 200;
-    match text.char_indices().nth(MAX_LENGTH) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
-    }
-}
+/// Maximum number of characters of a value in a message.
+const MAX_FOUND_CHARS: usize = 200;
 
 impl Invalid {
     /// An error whose path and value are added on the way out.
@@ -40,7 +35,7 @@ impl Invalid {
     /// Adds the value that was found, unless one is known.
     #[must_use]
     pub fn found(mut self, value: &Value) -> Self {
-        self.found.get_or_insert_with(|| shorten(&value.to_string()));
+        self.found.get_or_insert_with(|| shorten(&value.to_string(), MAX_FOUND_CHARS));
         self
     }
 
