@@ -124,9 +124,8 @@ fn read(
     check_points(MemoryEstimate::of_points(loaded.cloud.len() as u64, settings.subsample))?;
     let points = counted(loaded.cloud.len(), "point");
     progress.note(&format!("{points}, {}", loaded.info.format));
-    if settings.reproject.is_none() && !loaded.info.is_in_metres {
-        let system = loaded.info.coordinate_system.as_deref();
-        report_degrees(&loaded.cloud, system, &["reproject"], progress);
+    if settings.reproject.is_none() {
+        report_degrees(&loaded.cloud, &loaded.info, &["reproject"], progress);
     }
     Ok(loaded)
 }

@@ -23,13 +23,8 @@ const MIN_UPRIGHT_RANGE: f64 = 0.35;
 const MIN_OFFSET_RATIO: f64 = 100.0;
 
 /// Warns of points that stay in degrees, if they do. `keys` are those of settings that move them; there may be none.
-pub fn report_degrees(
-    cloud: &PointCloud,
-    system: Option<&str>,
-    keys: &[&str],
-    progress: &dyn Progress,
-) {
-    if is_in_degrees(cloud, system) {
+pub fn report_degrees(cloud: &PointCloud, info: &FileInfo, keys: &[&str], progress: &dyn Progress) {
+    if is_in_degrees(cloud, info) {
         let line = "x and y look like degrees of longitude and latitude; normals, radii and distances need metres: \
                     move the points to a coordinate system in metres";
         progress.warning(line, keys);
@@ -106,7 +101,7 @@ impl Reprojection {
     fn of(cloud: &PointCloud, info: &FileInfo, others: Option<&str>) -> Option<Self> {
         let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
         let extent = Extent::of(cloud);
-        if info.is_in_metres || !extent.is_in_degrees(cloud, source.as_ref()) {
+        if !extent.is_in_degrees(cloud, info, source.as_ref()) {
             return None;
         }
         let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
@@ -156,10 +151,11 @@ impl Reprojection {
     }
 }
 
-/// Returns true if the coordinates of a cloud are degrees: its `system` is geographic, or it has none and they look like
-/// degrees beside heights in metres.
-pub fn is_in_degrees(cloud: &PointCloud, system: Option<&str>) -> bool {
-    Extent::of(cloud).is_in_degrees(cloud, system.and_then(CoordinateSystem::parse).as_ref())
+/// Returns true if the coordinates of a cloud are degrees: its system is geographic, or it has none and they look like
+/// degrees beside heights in metres; and its format does not prescribe metres.
+pub fn is_in_degrees(cloud: &PointCloud, info: &FileInfo) -> bool {
+    let system = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
+    Extent::of(cloud).is_in_degrees(cloud, info, system.as_ref())
 }
 
 /// The least and greatest coordinates of a cloud.
@@ -175,9 +171,16 @@ impl Extent {
         Self { low, high }
     }
 
-    fn is_in_degrees(&self, cloud: &PointCloud, system: Option<&CoordinateSystem>) -> bool {
+    fn is_in_degrees(
+        &self,
+        cloud: &PointCloud,
+        info: &FileInfo,
+        system: Option<&CoordinateSystem>,
+    ) -> bool {
         let is_stated = system.map(|system| system.unit() == Unit::Degrees);
-        self.is_on_earth() && is_stated.unwrap_or_else(|| self.is_needle(cloud))
+        !info.is_in_metres
+            && self.is_on_earth()
+            && is_stated.unwrap_or_else(|| self.is_needle(cloud))
     }
 
     /// Returns false for a cloud without points, too.
@@ -314,8 +317,8 @@ mod tests {
 
     #[test]
     fn clouds_without_points_are_not_in_degrees() {
-        assert!(is_in_degrees(&points(1.0, MUNICH), Some("EPSG:4326")));
-        assert!(!is_in_degrees(&PointCloud::default(), Some("EPSG:4326")));
+        assert!(is_in_degrees(&points(1.0, MUNICH), &stated("EPSG:4326")));
+        assert!(!is_in_degrees(&PointCloud::default(), &stated("EPSG:4326")));
     }
 
     #[test]
@@ -349,7 +352,7 @@ mod tests {
             let (sin, cos) = (std::f64::consts::TAU * random(i, 0.618_034)).sin_cos();
             DVec3::new(0.025 * cos, 0.025 * sin, 6.0 * random(i, 0.754_878))
         });
-        assert!(!is_in_degrees(&pole, None));
+        assert!(!is_in_degrees(&pole, &FileInfo::default()));
         // A plain that slopes by 6 m, and one with houses, both 5.5 km wide.
         let [slope, town] = [false, true].map(|has_houses| {
             cloud(&|i| {
@@ -359,7 +362,7 @@ mod tests {
                 DVec3::new(0.05 * x, 0.05 * y, if has_houses { house } else { 6.0 * x })
             })
         });
-        assert!(is_in_degrees(&slope, None) && is_in_degrees(&town, None));
+        assert!([slope, town].iter().all(|land| is_in_degrees(land, &FileInfo::default())));
     }
 
     #[test]

@@ -58,9 +58,7 @@ pub fn import(
     }
     match content {
         // Rays that meet them are in their coordinates.
-        Some(MemoryContent::Points(cloud, system)) => {
-            report_degrees(cloud, system.as_deref(), &[], progress);
-        }
+        Some(MemoryContent::Points(cloud, _)) => report_degrees(cloud, &loaded.1, &[], progress),
         _ if settings.preparation.reproject != Some(false) => {
             return with_metres(loaded, options, progress);
         }
@@ -100,11 +98,13 @@ fn with_metres(
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
     if let [Geometry::Points(cloud)] = &mut graph.geometries[..] {
         let mut target = options.coordinate_system.as_deref();
-        match &options.crs {
-            Some(crs) if !info.is_in_metres && is_in_degrees(cloud, Some(crs)) => {
-                info.coordinate_system = Some(crs.clone());
+        if let Some(crs) = &options.crs {
+            let stated = FileInfo { coordinate_system: Some(crs.clone()), ..info.clone() };
+            if is_in_degrees(cloud, &stated) {
+                info = stated;
+            } else {
+                target = Some(crs);
             }
-            crs => target = crs.as_deref().or(target),
         }
         move_to_metres(cloud, &mut info, target, progress)?;
     }
