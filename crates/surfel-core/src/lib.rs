@@ -43,6 +43,7 @@ pub mod words;
 mod error;
 pub mod math;
 pub mod progress;
+pub mod locks;
 pub mod image;
 pub mod points;
 pub mod bvh;

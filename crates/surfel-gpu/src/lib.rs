@@ -49,7 +49,6 @@ mod unsupported;
 mod mesh_blocks;
 mod gaussian_arrays;
 mod threads;
-mod turns;
 mod transfer;
 mod upload;
 mod scene_records;

@@ -1,7 +1,6 @@
 //! The contents of an array, which are laid out piece by piece where they are copied: no copy of the whole is made.
 
-use crate::numbers::NODE_VECTORS;
-use crate::numbers::VECTOR_BYTES;
+use crate::numbers::{NODE_VECTORS, VECTOR_BYTES};
 use bytemuck::{NoUninit, Pod, Zeroable};
 use surfel_core::bvh::BvhNode;
 

@@ -11,12 +11,13 @@ use crate::picture_memory::scene_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::scene_words::SceneWords;
-use crate::turns::Turns;
 use crate::unsupported::unsupported;
 use crate::upload::{GpuTree, UploadTime, Uploads};
 use crate::wavefront::{Arrays, Capacities};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
+use surfel_core::locks::lock_unless_cancelled;
 use surfel_core::progress::Progress;
 use surfel_core::render::{RenderRegion, RenderStats, Renderer, Settings, check};
 
@@ -25,7 +26,7 @@ use surfel_core::render::{RenderRegion, RenderStats, Renderer, Settings, check};
 pub struct GpuRenderer {
     gpu: Gpu,
     /// A panic leaves nothing half done here: kernels and uploads are added when they are complete.
-    state: Turns<State>,
+    state: Mutex<State>,
 }
 
 /// Kernels, points and arrays, kept from picture to picture.
@@ -67,7 +68,7 @@ impl GpuRenderer {
             part_size: None,
             times: KernelTimes::default(),
         };
-        Ok(Self { gpu, state: Turns::new(state) })
+        Ok(Self { gpu, state: Mutex::new(state) })
     }
 
     /// Sets the maximum number of bytes to hold in the device's memory: trees, textures and the arrays of a picture. What
@@ -85,13 +86,18 @@ impl GpuRenderer {
     /// Returns the bytes of points and triangles that went to the device since it was opened, and the time that this took.
     /// Waits for a picture that is being rendered, as all methods do that ask for times.
     pub fn upload_time(&self) -> UploadTime {
-        self.state.wait().uploads.time
+        self.state().uploads.time
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A panic leaves a state that can be used.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Starts to measure how long each kernel works, if the device has a clock, or stops. Pictures take longer
     /// meanwhile: the device waits until its clock was read.
     pub fn measure_kernels(&self, is_wanted: bool) {
-        let times = &mut self.state.wait().times;
+        let times = &mut self.state().times;
         times.is_measured = is_wanted;
         if is_wanted {
             times.reset();
@@ -100,7 +106,7 @@ impl GpuRenderer {
 
     /// Returns the kernels' names and the work of each that was measured.
     pub fn kernel_times(&self) -> Vec<(String, KernelTime)> {
-        self.state.wait().times.named()
+        self.state().times.named()
     }
 
     /// Searches along given rays several times, as benchmarks do.
@@ -115,7 +121,7 @@ impl GpuRenderer {
     ) -> surfel_core::Result<RayTimes> {
         self.gpu.check()?;
         ray_timing::check(&self.gpu, timing.geometry, timing.query)?;
-        let mut state = self.state.wait_with(progress)?;
+        let mut state = lock_unless_cancelled(&self.state, progress)?;
         let State { kernels, uploads, arrays, .. } = &mut *state;
         ray_timing::time(&self.gpu, kernels, (uploads, arrays), timing, progress)
     }
@@ -140,7 +146,7 @@ impl Renderer for GpuRenderer {
         }
         let gpu = &self.gpu;
         gpu.check()?;
-        let mut state = self.state.wait_with(progress)?;
+        let mut state = lock_unless_cancelled(&self.state, progress)?;
         let passes = Passes::new(gpu, scene, settings)?;
         // Pictures have at most 2^28 pixels.
         let n_pixels = region.n_pixels() as u32;
@@ -232,7 +238,7 @@ mod tests {
     fn a_picture_that_waits_for_another_can_be_cancelled() {
         let Some(renderer) = open_renderer() else { return };
         let settings = Settings { width: 8, height: 4, ..Settings::default() };
-        let other = renderer.state.wait();
+        let other = renderer.state();
         let result = renderer.render(&empty_scene(), &settings, &CancelledAfter::new(2));
         assert_eq!(result.map(|_| ()), Err(CoreError::Cancelled));
         drop(other);
@@ -271,7 +277,7 @@ mod tests {
         let large = Settings { width: 64, height: 64, ..small };
         let render = |renderer: &GpuRenderer, settings: &Settings| {
             renderer.render(&empty_scene(), settings, &NoProgress).map(|_| {
-                let state = renderer.state.wait();
+                let state = renderer.state();
                 state.arrays.as_ref().map(|arrays| arrays.sizes().n_pixels)
             })
         };
@@ -289,7 +295,7 @@ mod tests {
         let settings = Settings { width: 256, height: 128, ..Settings::default() };
         assert!(renderer.render(&scenes[0], &settings, &NoProgress).is_ok());
         let tree_bytes = renderer.upload_time().n_bytes;
-        let sizes = renderer.state.wait().arrays.as_ref().unwrap().sizes();
+        let sizes = renderer.state().arrays.as_ref().unwrap().sizes();
         let passes = Passes::new(&renderer.gpu, &scenes[0], &settings).unwrap();
         let picture_bytes = Arrays::n_bytes(sizes) + scene_bytes(&scenes[0], &passes);
         // The limit fits a tree and its copy on the way, but no other tree.
@@ -298,7 +304,7 @@ mod tests {
         let renderer = open_renderer().unwrap().with_memory_limit(Some(limit));
         for scene in [&scenes[0], &scenes[1], &scenes[0]] {
             assert!(renderer.render(scene, &settings, &NoProgress).is_ok());
-            let state = renderer.state.wait();
+            let state = renderer.state();
             assert_eq!(state.arrays.as_ref().unwrap().sizes(), sizes);
         }
         assert_eq!(renderer.upload_time().n_bytes, 3 * tree_bytes);
@@ -328,12 +334,12 @@ mod tests {
         let Some(renderer) = open_renderer() else { return };
         let settings = Settings { width: 8, height: 4, ..Settings::default() };
         assert!(renderer.render(&textured_scene(), &settings, &NoProgress).is_ok());
-        assert!(renderer.state.wait().words.is_some());
+        assert!(renderer.state().words.is_some());
         // The trees of the next scene are refused.
         let limited = renderer.with_memory_limit(Some(1 << 12));
         let next = scene_of_points(SurfaceKind::Disc);
         assert!(limited.render(&next, &settings, &NoProgress).is_err());
-        assert!(limited.state.wait().words.is_none());
+        assert!(limited.state().words.is_none());
     }
 
     #[test]

@@ -14,9 +14,9 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use surfel::animate::{BuiltMovie, PlannedMovie, check_movie};
 use surfel::description::Invalid;
-use surfel::locks::lock_unless_cancelled;
 use surfel::progress_log::ProgressLog;
 use surfel::{Choice, RenderedImage};
+use surfel_core::locks::lock_unless_cancelled;
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 

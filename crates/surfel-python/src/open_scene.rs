@@ -4,9 +4,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
-use surfel::locks::lock_unless_cancelled;
 use surfel::progress_log::{Choice, ProgressLog};
 use surfel::resolve::check_files;
+use surfel_core::locks::lock_unless_cancelled;
 use surfel_core::progress::Progress;
 
 /// A scene, or none until it is needed.

@@ -1,11 +1,11 @@
 //! A cache of the last two results of long work, shared by threads.
 
 use crate::error::Result;
-use crate::locks::lock_unless_cancelled;
 use crate::progress_log::{ProgressLog, Records};
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use surfel_core::locks::lock_unless_cancelled;
 use surfel_core::progress::Progress;
 
 /// The last two results, by the hashes of what they were made from: people who compare settings go back and forth.

@@ -66,7 +66,6 @@ pub mod progress_log;
 pub mod overlay;
 pub mod resolve;
 pub mod picture;
-pub mod locks;
 mod cache;
 #[cfg(not(feature = "gpu"))]
 mod no_gpu;
