@@ -11,6 +11,7 @@ export CARGO_INCREMENTAL=0
 passed=0
 failed=0
 skipped=0
+failures=()
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
@@ -29,9 +30,22 @@ check() {
     if "$@"; then
         passed=$((passed + 1))
     else
-        echo "FAILED: $step"
-        failed=$((failed + 1))
+        fail
     fi
+}
+
+# Counts the present step, or the failure that is named, as failed.
+fail() {
+    echo "FAILED: ${1:-$step}"
+    failed=$((failed + 1))
+    failures+=("${1:-$step}")
+}
+
+# Keeps the names of failed tests, which are the matches of a pattern's group in the log, for the list at the end.
+keep_failures() {
+    local names
+    mapfile -t names < <(sed -nE "s/$1/$step: \1/p" "$log")
+    failures+=("${names[@]}")
 }
 
 # Runs cargo test and counts its tests. A build that fails counts as one failure.
@@ -39,8 +53,9 @@ tests() {
     begin "$1"
     shift
     if ! "$@" 2>&1 | tee "$log"; then
-        grep -q '^test result: FAILED' "$log" || failed=$((failed + 1))
+        grep -q '^test result: FAILED' "$log" || fail "$step: the build"
     fi
+    keep_failures '^test (.*) \.\.\. FAILED$'
     while read -r ok bad; do
         passed=$((passed + ok))
         failed=$((failed + bad))
@@ -63,7 +78,9 @@ page_tests() {
     left_out=$(sed -nE 's/^# (skipped|todo) ([0-9]+)$/\2/p' "$log" | paste -sd+)
     bad=$(sed -nE 's/^# (fail|cancelled) ([0-9]+)$/\2/p' "$log" | paste -sd+)
     passed=$((passed + ${ok:-0}))
-    failed=$((failed + ${bad:-1}))
+    [ -n "$bad" ] || fail
+    failed=$((failed + bad))
+    keep_failures '^not ok [0-9]+ - (.*)'
     skipped=$((skipped + ${left_out:-0}))
 }
 
@@ -135,8 +152,7 @@ python_tests() {
     if ! "${found[0]}" -m venv "$environment/build" || ! "$environment/build/bin/pip" install -q maturin >"$log" 2>&1; then
         skip "tests of the Python package: pip cannot install maturin"
     elif ! (cd crates/surfel-python && "$environment/build/bin/maturin" build --profile dev -q --out "$environment"); then
-        echo "FAILED: the wheel cannot be built"
-        failed=$((failed + 1))
+        fail "the wheel cannot be built"
     else
         wheel=$(echo "$environment"/*.whl)
         # What surfel works with but does not need; tests that need one that is missing are skipped. Notebooks run once.
@@ -159,8 +175,9 @@ pytest_in() {
     fi
     shift 3
     for word; do "$pip" install -q $word >"$log" 2>&1; done
-    "$pip" install -q --no-index --no-deps "$wheel" && (cd crates/surfel-python && "$environment/bin/python" -m pytest -q -rs tests) 2>&1 | tee "$log"
-    grep -qE '^[0-9].* in [0-9.]+s' "$log" || failed=$((failed + 1))
+    "$pip" install -q --no-index --no-deps "$wheel" && (cd crates/surfel-python && "$environment/bin/python" -m pytest -q -rfEs tests) 2>&1 | tee "$log"
+    grep -qE '^[0-9].* in [0-9.]+s' "$log" || fail
+    keep_failures '^(FAILED .*|ERROR .*)'
     while read -r count word; do
         case $word in
             passed) passed=$((passed + count)) ;;
@@ -214,5 +231,6 @@ fi
 check "benchmarks, once" env POINTS=100000 cargo test --workspace --bench '*'
 begin ""
 
+[ ${#failures[@]} -eq 0 ] || printf 'failed: %s\n' "${failures[@]}"
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

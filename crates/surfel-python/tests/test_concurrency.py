@@ -170,9 +170,9 @@ def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
     time.sleep(0.2)
     # Programs that a shell has put in the background ignore the signal.
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Timer(0.2, _thread.interrupt_main).start()
     try:
         with pytest.raises(KeyboardInterrupt):
+            threading.Timer(0.5, _thread.interrupt_main).start()
             movie.render(1)
         assert rendering.is_alive()
     finally:
@@ -273,8 +273,12 @@ def test_a_scene_starts_no_more_threads_than_it_is_given(hill):
     code = f"""
 import os, surfel, time
 def n_threads():
-    time.sleep(0.5)
-    return len(os.listdir("/proc/self/task"))
+    count = lambda: len(os.listdir("/proc/self/task"))
+    counts = [count()]
+    while len(counts) < 10 or len(set(counts[-10:])) != 1:
+        time.sleep(0.1)
+        counts.append(count())
+    return counts[-1]
 first = surfel.load({str(hill)!r})
 first.render(resolution=(8, 8), spp=1)
 before = n_threads()

@@ -79,7 +79,15 @@ def test_a_script_waits_for_the_end_of_its_viewer(hill):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGINT is sent to a process")
 def test_ctrl_c_ends_a_script_that_waits(hill):
-    code = "import surfel, sys; v = surfel.view(surfel.load(sys.argv[1])); print(v.url, flush=True); v.wait(); print('over')"
+    # Programs that a shell has put in the background ignore the signal. The address is printed once the script waits.
+    code = """
+import signal, sys, threading, surfel
+signal.signal(signal.SIGINT, signal.default_int_handler)
+viewer = surfel.view(surfel.load(sys.argv[1]))
+threading.Timer(0.5, lambda: print(viewer.url, flush=True)).start()
+viewer.wait()
+print("over")
+"""
     script = subprocess.Popen([sys.executable, "-c", code, hill], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     url = script.stdout.readline().strip()
     assert fetch(url) and script.poll() is None

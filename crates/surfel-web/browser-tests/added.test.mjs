@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, data, finishedPixels, openPage, pixels, QUICK, reopen, serve, settled, shell, state, unfoldPanel } from './harness.mjs';
+import { closePage, data, finishedPixels, openPage, pixels, QUICK, recorded, reopen, serve, settled, shell, state, unfoldPanel } from './harness.mjs';
 
 let server;
 let page;
@@ -177,7 +177,12 @@ test('a lost connection tells what it loses, and undo goes around it', async () 
   await drop(other, [['pyramid.obj', PYRAMID]]);
   await other.locator('[data-object="pyramid.obj"]').waitFor({ state: 'attached' });
   await settled(other);
-  await other.waitForFunction(() => !document.querySelector('[data-action="undo"]').disabled);
+  // The address does not hold the file, so a further change tells that it has been recorded.
+  await unfoldPanel(other);
+  await other.selectOption('[data-key="color"]', 'elevation');
+  await recorded(other, ({ color }) => color === 'elevation');
+  await other.locator('[data-action="undo"]').click();
+  await recorded(other, ({ color }) => color !== 'elevation');
   await own.stop();
   await other.locator('.toast', { hasText: /lost, and with it pyramid.obj/ }).waitFor();
   await serve(['town.ply', 'house.obj'], ...QUICK, '--port', own.port);

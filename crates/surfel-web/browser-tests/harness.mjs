@@ -12,7 +12,8 @@ const TARGET = process.env.CARGO_TARGET_DIR ?? join(import.meta.dirname, '../../
 /** The program under test. */
 export const SURFEL = process.env.SURFEL ?? join(TARGET, 'debug/surfel');
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
-export const TIMEOUT_MS = 60_000;
+/** Much more than anything takes: saves and movies leave the processor to all other work. */
+export const TIMEOUT_MS = 300_000;
 /** A host name of this machine that is no secure context to the browser, like the names of other machines. */
 export const PLAIN_HOST = 'surfel.test';
 const FLAGS = [`--host-resolver-rules=MAP ${PLAIN_HOST} 127.0.0.1`, '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
@@ -119,9 +120,9 @@ export async function settled(page) {
   }, progress, { timeout: TIMEOUT_MS });
 }
 
-/** Runs in the page: counts the answers to picks in `picks.n_answered`, and delays the next ones by `picks.delays_ms`. */
+/** Runs in the page: counts picks in `picks.n_sent` and their answers in `picks.n_answered`; delays the next answers by `picks.delays_ms`. */
 function definePicks() {
-  const picks = { n_answered: 0, delays_ms: [] };
+  const picks = { n_sent: 0, n_answered: 0, delays_ms: [] };
   window.picks = picks;
   window.WebSocket = class extends WebSocket {
     constructor(...words) {
@@ -134,6 +135,11 @@ function definePicks() {
           picks.n_answered += 1;
         }, picks.delays_ms.shift() ?? 0);
       });
+    }
+
+    send(message) {
+      if (typeof message === 'string' && JSON.parse(message).type === 'pick') picks.n_sent += 1;
+      super.send(message);
     }
   };
 }

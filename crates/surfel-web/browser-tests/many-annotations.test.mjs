@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { decodeHash, encodeHash } from '../page/link.js';
-import { blankPage, closePage, data, drag, pixelAt, QUICK, recorded, recordPictures, serve, settled, state } from './harness.mjs';
+import { blankPage, closePage, data, pixelAt, QUICK, recorded, recordPictures, serve, settled, state } from './harness.mjs';
 
 let server;
 let page;
@@ -32,7 +32,13 @@ test('a thousand annotations', async () => {
   assert.ok(20 < n_labels && n_labels < 1000, `${n_labels} labels have room`);
   await recordPictures(page);
   const { seq } = await state(page, 'lastFrame');
-  await drag(page, await pixelAt(page, 0.7, 0.5), await pixelAt(page, 0.8, 0.55), { steps: 10 });
+  const [start, middle, end] = [await pixelAt(page, 0.7, 0.5), await pixelAt(page, 0.75, 0.5), await pixelAt(page, 0.8, 0.55)];
+  await page.mouse.move(start.x, start.y);
+  await page.mouse.down();
+  await page.mouse.move(middle.x, middle.y, { steps: 5 });
+  await page.waitForFunction((before) => before < window.surfel.state.lastFrame.seq, seq);
+  await page.mouse.move(end.x, end.y, { steps: 5 });
+  await page.mouse.up();
   await settled(page);
   assert.ok(1 < new Set((await page.evaluate(() => window.pictures.map((one) => one.seq))).filter((one) => seq < one)).size);
   await page.locator('[aria-label="Delete tree 3"]').click();

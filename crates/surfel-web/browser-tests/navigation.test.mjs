@@ -92,6 +92,8 @@ for (const projection of ['perspective', 'orthographic']) {
     await settled(page);
     const pixel = await pixelAt(page, 0.65, 0.6);
     const [start, point] = [await state(page, 'camera'), await pick(pixel)];
+    // The point under the mouse has been asked for as well.
+    await page.locator('#cursor:not(:empty)').waitFor();
     const n_answered = await page.evaluate(() => window.picks.n_answered);
     await stopClock();
     await page.mouse.wheel(0, -100);

@@ -67,11 +67,11 @@ test('the status line has the coordinates of the point under the mouse, but not 
   await page.mouse.down();
   await page.mouse.move(pixel.x + 60, pixel.y, { steps: 4 });
   assert.equal(await cursor.textContent(), '');
-  const n_answered = await page.evaluate(() => window.picks.n_answered);
+  const n_sent = await page.evaluate(() => window.picks.n_sent);
   await page.mouse.move(other.x, other.y, { steps: 4 });
   await page.waitForTimeout(300);
   assert.equal(await cursor.textContent(), '');
-  assert.equal(await page.evaluate(() => window.picks.n_answered), n_answered);
+  assert.equal(await page.evaluate(() => window.picks.n_sent), n_sent);
   await page.mouse.up();
   await page.locator('#cursor:not(:empty)').waitFor();
   await page.locator('#panel-fold').hover();
@@ -283,6 +283,7 @@ test('scene files carry measurements: the viewer shows them again, and the comma
   shell('surfel render measured.toml --resolution 64x48 --spp 1 -o measured.png');
   const other = await openPage((await serve(['measured.toml'], ...QUICK)).link);
   const name = other.locator('.measurement h3');
+  await name.waitFor();
   assert.deepEqual(await name.allTextContents(), ['distance 1']);
   assert.equal(decodeHash(new URL(other.url()).hash)?.measurements ?? null, null);
   // A link tells that they were deleted.
@@ -292,6 +293,7 @@ test('scene files carry measurements: the viewer shows them again, and the comma
   await settled(other);
   assert.equal(await name.count(), 0);
   await reopen(other);
+  await name.waitFor();
   assert.equal(await name.count(), 1);
   await closePage(other);
   await reopen(page);

@@ -35,9 +35,10 @@ export function setUpSceneLoading(viewer, measureTool, addFiles) {
     document.body.classList.remove('is-dropping');
     load(event.dataTransfer.files);
   });
-  window.addEventListener('hashchange', () => {
+  window.addEventListener('hashchange', ({ newURL }) => {
     if (!viewer.isConnected) return;
-    const { patch, measurements } = readLink(location.hash, showToast);
+    // The history may have written the address of the last view over it meanwhile.
+    const { patch, measurements } = readLink(new URL(newURL).hash, showToast);
     viewer.showLink(patch);
     measureTool.figures = measurements ?? viewer.initialMeasurements;
   });

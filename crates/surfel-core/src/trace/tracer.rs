@@ -145,7 +145,6 @@ mod tests {
     use crate::math::DVec3;
     use crate::progress::NoProgress;
     use crate::scene::{Background, Camera, Graph, Projection, Scene};
-    use std::cell::RefCell;
 
     fn empty() -> FlatScene {
         let camera = Camera {
@@ -159,25 +158,27 @@ mod tests {
             .unwrap()
     }
 
-    /// Returns the sizes of the chunks of `n_rays` that take `per_ray` each.
-    fn chunk_sizes(tracer: &Tracer, n_rays: usize, per_ray: Duration) -> Vec<usize> {
-        let sizes = RefCell::new(Vec::new());
-        let work = |chunk: Range<usize>| {
-            std::thread::sleep(per_ray * chunk.len() as u32);
-            sizes.borrow_mut().push(chunk.len());
+    #[test]
+    fn chunks_grow_while_rays_are_fast_and_shrink_while_they_are_slow() {
+        let size = |n_rays, per_ray_us| {
+            next_size(n_rays, Duration::from_micros(per_ray_us) * n_rays as u32)
         };
-        tracer.in_chunks(n_rays, work).unwrap();
-        sizes.into_inner()
+        assert_eq!([512, 1024, 2048].map(|n_rays| size(n_rays, 0)), [1024, 2048, 2048]);
+        assert_eq!([512, 2048].map(|n_rays| size(n_rays, 5)), [1008, 1008]);
+        assert_eq!(size(512, 1000), PACKET_WIDTH);
     }
 
     #[test]
-    fn chunks_grow_while_rays_are_fast_and_shrink_while_they_are_slow() {
+    fn chunks_cover_all_rays() {
         let scene = empty();
         let tracer = Tracer::new(&scene, Simd::detect(), PixelSize::ZERO, &NoProgress);
-        let fast = chunk_sizes(&tracer, 4000, Duration::ZERO);
-        assert_eq!(fast, [512, 1024, 2048, 416]);
-        let slow = chunk_sizes(&tracer, 540, Duration::from_millis(1));
-        assert_eq!(slow, [512, PACKET_WIDTH, 12]);
+        let mut end = 0;
+        let work = |chunk: Range<usize>| {
+            assert!(chunk.start == end && chunk.len() <= MAX_CHUNK_SIZE);
+            end = chunk.end;
+        };
+        tracer.in_chunks(4000, work).unwrap();
+        assert_eq!(end, 4000);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use surfel_core::points::{COLOR_8_TO_16, PointCloud};
 use surfel_core::progress::Progress;
 
 use crate::file::Input;
+use crate::table::ColumnSlices;
 
 /// The number of bits of the colours that were read so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,10 +20,10 @@ pub(super) enum ColorBits {
 }
 
 impl ColorBits {
-    /// Scales the colours of the points from `start` on to 16 bits, given those before.
-    pub fn scale(&mut self, cloud: &mut PointCloud, start: usize) {
-        let Some(colors) = &mut cloud.colors else { return };
-        let (before, new) = colors.split_at_mut(start);
+    /// Scales the colours of further points to 16 bits, and mends those `before` if they had other bits than it seemed.
+    pub fn scale(&mut self, before: ColumnSlices, cloud: &mut PointCloud) {
+        let Some(new) = &mut cloud.colors else { return };
+        let before = before.colors.unwrap_or_default();
         let largest = new.par_iter().flatten_iter().copied().max().unwrap_or(0);
         match (*self, largest) {
             (Self::Bits16, _) | (Self::Unknown, 0) => {}
@@ -62,19 +63,19 @@ mod tests {
     //! Colours of several batches.
 
     use super::*;
-    use surfel_core::math::Vec3;
 
     fn scaled(batches: &[&[u16]]) -> (Vec<u16>, ColorBits) {
-        let (mut channels, mut bits) = (Vec::new(), ColorBits::default());
+        let (mut colors, mut bits) = (Vec::new(), ColorBits::default());
         for batch in batches {
-            let start = channels.len();
-            channels.extend_from_slice(batch);
-            let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO; channels.len()]);
-            cloud.colors = Some(channels.iter().map(|v| [*v, 0, 0]).collect());
-            bits.scale(&mut cloud, start);
-            channels = cloud.colors.unwrap().iter().map(|color| color[0]).collect();
+            let mut cloud = PointCloud::default();
+            cloud.colors = Some(batch.iter().map(|v| [*v, 0, 0]).collect());
+            bits.scale(
+                ColumnSlices { colors: Some(&mut colors), ..Default::default() },
+                &mut cloud,
+            );
+            colors.extend(cloud.colors.unwrap());
         }
-        (channels, bits)
+        (colors.iter().map(|color| color[0]).collect(), bits)
     }
 
     #[test]

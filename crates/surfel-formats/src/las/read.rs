@@ -20,9 +20,12 @@ use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
-    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout, choose_origin,
-    grow_checked, keep_matching, read_records, sample_positions, shrink,
+    ColumnChoice, ColumnRole, ColumnSlices, FilteredCloud, RecordLayout, choose_origin,
+    read_records, resize_checked, sample_positions,
 };
+
+/// Number of points whose chunks are decoded before the filter drops those that are not kept: chunks for many threads.
+const FILTERED_POINTS_PER_BATCH: usize = 1 << 20;
 
 /// Reads the header.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
@@ -56,7 +59,7 @@ pub(crate) fn read(
         let n_points = (records.len() / header.record_length) as u64;
         progress.begin(&format!("read {}", input.name), n_points);
         let mut color_bits = ColorBits::default();
-        let scale = |cloud: &mut PointCloud, start| color_bits.scale(cloud, start);
+        let scale = |before: ColumnSlices, cloud: &mut PointCloud| color_bits.scale(before, cloud);
         let filter = options.filter.as_ref();
         let cloud = read_records(input, records, &layout, origin, filter, scale, progress)?;
         Decoded { cloud, color_bits, n_points }
@@ -130,48 +133,50 @@ impl ChunkReader<'_> {
         progress: &dyn Progress,
     ) -> Result<Decoded> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
-        let cloud = self.layout.empty_cloud(origin);
-        let mut decoded = Decoded { cloud, color_bits: ColorBits::default(), n_points: 0 };
-        let filter = self.options.filter.as_ref();
-        if filter.is_none() {
-            self.append_chunks(&mut decoded, chunks, &chunks.chunks, salvage, progress)?;
-            decoded.color_bits.scale(&mut decoded.cloud, 0);
-            return Ok(decoded);
-        }
+        let mut cloud = self.layout.empty_cloud(origin);
+        let mut color_bits = ColorBits::default();
+        let Some(filter) = &self.options.filter else {
+            let n_points =
+                self.decode_chunks(&mut cloud, chunks, &chunks.chunks, salvage, progress)?;
+            color_bits.scale(ColumnSlices::default(), &mut cloud);
+            return Ok(Decoded { cloud, color_bits, n_points });
+        };
+        let n_at_most = chunks.chunks.iter().map(|chunk| chunk.n_points).sum();
+        let mut filtered = FilteredCloud::new(self.input, cloud, n_at_most, filter);
+        let mut n_points = 0;
         let mut rest = &chunks.chunks[..];
         while !rest.is_empty() {
-            let mut n_points = 0;
+            let mut n_in_batch = 0;
             let is_in_batch = |chunk: &&Chunk| {
-                n_points += chunk.n_points;
-                n_points <= FILTERED_POINTS_PER_BATCH
+                n_in_batch += chunk.n_points;
+                n_in_batch <= FILTERED_POINTS_PER_BATCH
             };
             let n_chunks = rest.iter().take_while(is_in_batch).count().max(1);
             let (batch, after) = rest.split_at(n_chunks);
-            let n_before = decoded.cloud.len();
-            self.append_chunks(&mut decoded, chunks, batch, salvage, progress)?;
-            decoded.color_bits.scale(&mut decoded.cloud, n_before);
-            keep_matching(&mut decoded.cloud, n_before, filter)?;
+            filtered.append(|before, cloud| {
+                n_points += self.decode_chunks(cloud, chunks, batch, salvage, progress)?;
+                color_bits.scale(before, cloud);
+                Ok(())
+            })?;
             rest = after;
         }
-        shrink(&mut decoded.cloud);
-        Ok(decoded)
+        Ok(Decoded { cloud: filtered.finish(), color_bits, n_points })
     }
 
-    /// Decodes some of the chunks to the end of a cloud. Those that do not decode are damage.
-    fn append_chunks(
+    /// Decodes some of the chunks to the points of a cloud, over those that it has. Chunks that do not decode are
+    /// damage. Returns the number of points.
+    fn decode_chunks(
         &self,
-        decoded: &mut Decoded,
+        cloud: &mut PointCloud,
         chunks: &Chunks,
         batch: &[Chunk],
         salvage: &mut Salvage,
         progress: &dyn Progress,
-    ) -> Result<()> {
+    ) -> Result<u64> {
         let selection = selection(&self.options.columns);
-        let Decoded { cloud, n_points, .. } = decoded;
-        let (n_before, origin) = (cloud.len(), cloud.origin);
-        let n_new: usize = batch.iter().map(|chunk| chunk.n_points).sum();
-        grow_checked(cloud, n_before + n_new, self.input)?;
-        let mut rest = ColumnSlices::from_cloud(cloud, n_before);
+        let origin = cloud.origin;
+        resize_checked(cloud, batch.iter().map(|chunk| chunk.n_points).sum(), self.input)?;
+        let mut rest = ColumnSlices::from_cloud(cloud, 0);
         let tasks: Vec<(&Chunk, ColumnSlices)> =
             batch.iter().map(|chunk| (chunk, rest.split_off_front(chunk.n_points))).collect();
         let decode = |(chunk, mut slices): (&Chunk, ColumnSlices)| {
@@ -188,16 +193,15 @@ impl ChunkReader<'_> {
         let mut is_whole = Vec::new();
         for (chunk, result) in batch.iter().zip(results) {
             is_whole.push((chunk.n_points, result.is_ok()));
-            match result {
-                Ok(()) => *n_points += chunk.n_points as u64,
-                Err(error) => salvage.accept(error)?,
+            if let Err(error) = result {
+                salvage.accept(error)?;
             }
         }
         if is_whole.iter().any(|(_, is_whole)| !is_whole) {
             let of_points = is_whole.into_iter().flat_map(|(n, is_whole)| repeat_n(is_whole, n));
-            cloud.retain_from(n_before, &of_points.collect::<Vec<bool>>());
+            cloud.retain_from(0, &of_points.collect::<Vec<bool>>());
         }
-        Ok(())
+        Ok(cloud.len() as u64)
     }
 }
 

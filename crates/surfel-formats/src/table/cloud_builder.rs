@@ -4,9 +4,9 @@ use rayon::prelude::*;
 use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PointFilter};
 
-use super::column_slices::{ColumnSlices, shrink};
+use super::column_slices::{ColumnSlices, resize_checked, shrink};
 use super::layout::RecordLayout;
-use super::reader::{Tolerance, grow_checked, keep_matching, origin_of_records};
+use super::reader::{Tolerance, keep_matching, origin_of_records};
 use crate::error::Result;
 use crate::file::Input;
 
@@ -45,7 +45,7 @@ impl<'a, F: Fn(&[u8]) -> RecordLayout> CloudBuilder<'a, F> {
         layout.demote_classes(batch, cloud);
         let n_before = cloud.len();
         let n_new: usize = batch.iter().map(|records| records.len() / layout.stride).sum();
-        grow_checked(cloud, n_before + n_new, self.input)?;
+        resize_checked(cloud, n_before + n_new, self.input)?;
         let origin = cloud.origin;
         let mut rest = ColumnSlices::from_cloud(cloud, n_before);
         let tasks: Vec<(&Vec<u8>, ColumnSlices)> = batch

@@ -1,7 +1,12 @@
 //! Slices of a cloud's columns that threads fill in parallel.
 
+use std::ops::Range;
+
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, Values};
+
+use crate::error::{Error, Result};
+use crate::file::Input;
 
 /// Slices of all columns of a cloud, for one range of points.
 #[derive(Default)]
@@ -82,10 +87,30 @@ impl<'a> ColumnSlices<'a> {
                 .collect(),
         }
     }
+
+    /// Copies ranges of points to the first points of these slices, one after the other.
+    pub fn copy_ranges(&mut self, from: &ColumnSlices, ranges: &[Range<usize>]) {
+        copy(&mut self.positions, &from.positions, ranges);
+        copy_if_present(&mut self.normals, &from.normals, ranges);
+        copy_if_present(&mut self.radii, &from.radii, ranges);
+        copy_if_present(&mut self.colors, &from.colors, ranges);
+        copy_if_present(&mut self.intensity, &from.intensity, ranges);
+        copy_if_present(&mut self.classification, &from.classification, ranges);
+        for (to, from) in self.scalars.iter_mut().zip(&from.scalars) {
+            match (to, from) {
+                (ValuesMut::U8(to), ValuesMut::U8(from)) => copy(to, from, ranges),
+                (ValuesMut::U16(to), ValuesMut::U16(from)) => copy(to, from, ranges),
+                (ValuesMut::I32(to), ValuesMut::I32(from)) => copy(to, from, ranges),
+                (ValuesMut::F32(to), ValuesMut::F32(from)) => copy(to, from, ranges),
+                (ValuesMut::F64(to), ValuesMut::F64(from)) => copy(to, from, ranges),
+                _ => unreachable!("both have the same columns"),
+            }
+        }
+    }
 }
 
-/// Extends every column to `n` points with zeros; returns false if they do not fit in memory.
-pub(crate) fn grow(cloud: &mut PointCloud, n: usize) -> bool {
+/// Cuts every column to `n` points, or extends it by zeros; returns false if they do not fit in memory.
+pub(crate) fn resize(cloud: &mut PointCloud, n: usize) -> bool {
     fn column<T: Copy + Default>(column: &mut Vec<T>, n: usize) -> bool {
         if column.is_empty() {
             // Fresh zeros come from the system as untouched pages, which the threads that fill them page in.
@@ -116,6 +141,14 @@ pub(crate) fn grow(cloud: &mut PointCloud, n: usize) -> bool {
         })
 }
 
+/// Gives the columns of `cloud` `n` points: cuts them, or extends them by zeros.
+pub(crate) fn resize_checked(cloud: &mut PointCloud, n: usize, input: &Input) -> Result<()> {
+    if resize(cloud, n) {
+        return Ok(());
+    }
+    Err(Error::OutOfMemory { file: input.name.to_string(), n_points: n as u64 })
+}
+
 /// Releases the memory that columns reserved and do not use.
 pub(crate) fn shrink(cloud: &mut PointCloud) {
     cloud.positions.shrink_to_fit();
@@ -132,6 +165,26 @@ pub(crate) fn shrink(cloud: &mut PointCloud) {
             Values::F32(v) => v.shrink_to_fit(),
             Values::F64(v) => v.shrink_to_fit(),
         }
+    }
+}
+
+fn copy_if_present<T: Copy>(
+    to: &mut Option<&mut [T]>,
+    from: &Option<&mut [T]>,
+    ranges: &[Range<usize>],
+) {
+    if let (Some(to), Some(from)) = (to, from) {
+        copy(to, from, ranges);
+    }
+}
+
+/// Copies ranges of `from` to the front of `to`, one after the other.
+fn copy<T: Copy>(to: &mut [T], from: &[T], ranges: &[Range<usize>]) {
+    let mut end = 0;
+    for range in ranges {
+        let start = end;
+        end += range.len();
+        to[start..end].copy_from_slice(&from[range.clone()]);
     }
 }
 

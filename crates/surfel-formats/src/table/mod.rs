@@ -7,6 +7,7 @@ mod column_slices;
 mod layout;
 mod named_columns;
 mod reader;
+mod filtered_cloud;
 mod cloud_builder;
 mod line_end;
 mod line_reader;
@@ -19,10 +20,11 @@ pub(crate) use chunks::{ParseFault, TextChunk, line_at, parse_chunks};
 pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
-pub(crate) use column_slices::{ColumnSlices, shrink};
+pub(crate) use column_slices::{ColumnSlices, resize_checked, shrink};
 pub(crate) use encode::{
     POINTS_PER_CHUNK, decimal_step, encode_points, note_rounded_colors, scalar_word,
 };
+pub(crate) use filtered_cloud::FilteredCloud;
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_end::{FindEnd, find_line_end};
 pub(crate) use line_reader::{
@@ -31,6 +33,6 @@ pub(crate) use line_reader::{
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
-    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching, note_kept,
-    origin_of_records, read_records, sample_positions,
+    Tolerance, choose_origin, keep_matching, note_kept, origin_of_records, read_records,
+    sample_positions,
 };

@@ -6,16 +6,17 @@ use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::Progress;
 use surfel_core::words::counted;
 
-use super::column_slices::{ColumnSlices, grow, shrink};
+use super::column_slices::{ColumnSlices, resize_checked};
+use super::filtered_cloud::FilteredCloud;
 use super::layout::RecordLayout;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::file::Input;
 
-/// Number of points that a task decodes between two checks for cancellation: some milliseconds of work.
-const POINTS_PER_TASK: usize = 1 << 16;
+/// Number of points that a task decodes between two checks for cancellation: about a millisecond of work.
+const POINTS_PER_TASK: usize = 1 << 14;
 
-/// Number of points that are decoded before the filter drops those that are not kept.
-pub(crate) const FILTERED_POINTS_PER_BATCH: usize = 1 << 20;
+/// Number of points that are decoded before the filter drops those that are not kept, so that they stay in the cache.
+const FILTERED_POINTS_PER_BATCH: usize = 1 << 17;
 
 /// The error of coordinates, in metres, that rounding to f32 may cause before a cloud gets an origin other than zero.
 #[derive(Clone, Copy)]
@@ -28,31 +29,32 @@ impl Tolerance {
     pub const F32_COORDINATES: Self = Self(4e-3);
 }
 
-/// Decodes those of `records` that `filter` keeps to a cloud. `complete` finishes the points from an index on, before the
-/// filter compares them.
+/// Decodes those of `records` that `filter` keeps to a cloud. `complete` gets the points that were kept before, and
+/// finishes further ones before the filter compares them.
 pub(crate) fn read_records(
     input: &Input,
     records: &[u8],
     layout: &RecordLayout,
     origin: DVec3,
     filter: Option<&PointFilter>,
-    mut complete: impl FnMut(&mut PointCloud, usize),
+    mut complete: impl FnMut(ColumnSlices, &mut PointCloud),
     progress: &dyn Progress,
 ) -> Result<PointCloud> {
     let mut cloud = layout.empty_cloud(origin);
-    if filter.is_none() {
-        append_decoded(&mut cloud, input, records, layout, progress)?;
-        complete(&mut cloud, 0);
+    let Some(filter) = filter else {
+        decode_records(&mut cloud, input, records, layout, progress)?;
+        complete(ColumnSlices::default(), &mut cloud);
         return Ok(cloud);
-    }
+    };
+    let mut filtered = FilteredCloud::new(input, cloud, records.len() / layout.stride, filter);
     for batch in records.chunks(FILTERED_POINTS_PER_BATCH * layout.stride) {
-        let n_before = cloud.len();
-        append_decoded(&mut cloud, input, batch, layout, progress)?;
-        complete(&mut cloud, n_before);
-        keep_matching(&mut cloud, n_before, filter)?;
+        filtered.append(|before, cloud| {
+            decode_records(cloud, input, batch, layout, progress)?;
+            complete(before, cloud);
+            Ok(())
+        })?;
     }
-    shrink(&mut cloud);
-    Ok(cloud)
+    Ok(filtered.finish())
 }
 
 /// Drops the points from `start` on that `filter` does not keep.
@@ -80,18 +82,17 @@ pub(crate) fn note_kept(
     progress.note(&format!("{}: {n_kept} of {points} meet {}", input.name, filter.describe()));
 }
 
-/// Decodes all of `records` to the end of a cloud.
-fn append_decoded(
+/// Decodes `records` to the points of a cloud, over those that it has.
+fn decode_records(
     cloud: &mut PointCloud,
     input: &Input,
     records: &[u8],
     layout: &RecordLayout,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let n_before = cloud.len();
     let origin = cloud.origin;
-    grow_checked(cloud, n_before + records.len() / layout.stride, input)?;
-    let mut rest = ColumnSlices::from_cloud(cloud, n_before);
+    resize_checked(cloud, records.len() / layout.stride, input)?;
+    let mut rest = ColumnSlices::from_cloud(cloud, 0);
     let tasks: Vec<(&[u8], ColumnSlices)> = records
         .chunks(POINTS_PER_TASK * layout.stride)
         .map(|records| (records, rest.split_off_front(records.len() / layout.stride)))
@@ -102,14 +103,6 @@ fn append_decoded(
         progress.advance(slices.len() as u64);
         Ok(())
     })
-}
-
-/// Extends the columns of `cloud` to `n` points of zeros.
-pub(crate) fn grow_checked(cloud: &mut PointCloud, n: usize, input: &Input) -> Result<()> {
-    if grow(cloud, n) {
-        return Ok(());
-    }
-    Err(Error::OutOfMemory { file: input.name.to_string(), n_points: n as u64 })
 }
 
 /// Chooses the origin of a cloud by a sample of its records.

@@ -264,7 +264,7 @@ async fn floods_of_requests_do_not_block_other_pages() {
 
 #[tokio::test]
 async fn floods_are_answered_and_pictures_go_on() {
-    let limits = Limits { max_message_rate: 1.0, max_message_burst: 20.0, ..Limits::default() };
+    let limits = Limits { max_message_rate: 1e-3, max_message_burst: 20.0, ..Limits::default() };
     let server = TestServer::start_with_limits(limits);
     let mut page = TestPage::open(&server, json!({})).await;
     page.message("scene").await;

@@ -32,6 +32,8 @@ pub const N_SAMPLES: u32 = 4;
 #[derive(Default)]
 pub struct Gate {
     is_open: Mutex<bool>,
+    /// Number of preparations that have reached the gate.
+    pub n_arrived: AtomicU32,
     opened: Condvar,
 }
 
@@ -42,6 +44,7 @@ impl Gate {
     }
 
     pub fn wait(&self) {
+        self.n_arrived.fetch_add(1, Ordering::Relaxed);
         let is_open = self.is_open.lock().unwrap();
         drop(self.opened.wait_while(is_open, |is_open| !*is_open).unwrap());
     }

@@ -94,7 +94,7 @@ async fn scenes_are_shown_while_slow_settings_keep_coming() {
     while n_scenes < 3 {
         seq += 1;
         assert!(seq < 1000, "{n_scenes} scenes were shown");
-        page.change_settings(seq, json!({ "slow": 0.2, "tint": seq })).await;
+        page.change_settings(seq, json!({ "slow": 1, "tint": seq })).await;
         let messages = page.messages_within(Duration::from_millis(20)).await;
         n_scenes += messages.iter().filter(|message| message["type"] == "scene").count();
     }

@@ -3,6 +3,7 @@
 use super::condition::{Condition, Operand, Relation};
 use crate::error::{Error, Result};
 use crate::points::{COLOR_8_TO_16, KnownColumn, PointCloud, Values, name_of_pdal, plain_name};
+use std::iter::repeat;
 use std::ops::Range;
 
 /// The greatest channel of a colour of 8 bits. A channel that is compared with a greater number has 16 bits.
@@ -19,6 +20,14 @@ pub(super) struct Evaluation<'a> {
 enum ColumnValues<'a> {
     Known(KnownColumn),
     Scalar(&'a Values),
+}
+
+/// The values of an operand.
+enum OperandValues {
+    /// One number for all points.
+    Number(f64),
+    /// A number for each point.
+    Column(Vec<f64>),
 }
 
 impl<'a> Evaluation<'a> {
@@ -53,21 +62,19 @@ impl<'a> Evaluation<'a> {
                 }
             }
             Condition::Compare(left, relation, right) => {
-                let (left, right) = (
-                    self.values(left, right, start, matches),
-                    self.values(right, left, start, matches),
-                );
-                let pairs = matches.iter_mut().zip(left.iter().zip(&right));
-                match relation {
-                    Relation::Equal => pairs.for_each(|(is_match, (a, b))| *is_match = a == b),
-                    Relation::NotEqual => pairs.for_each(|(is_match, (a, b))| *is_match = a != b),
-                    Relation::Less => pairs.for_each(|(is_match, (a, b))| *is_match = a < b),
-                    Relation::LessOrEqual => {
-                        pairs.for_each(|(is_match, (a, b))| *is_match = a <= b)
+                let values = |operand, other| self.values(operand, other, start, matches.len());
+                match (values(left, right), values(right, left)) {
+                    (OperandValues::Number(a), OperandValues::Number(b)) => {
+                        compare(matches, repeat((a, b)), *relation);
                     }
-                    Relation::Greater => pairs.for_each(|(is_match, (a, b))| *is_match = a > b),
-                    Relation::GreaterOrEqual => {
-                        pairs.for_each(|(is_match, (a, b))| *is_match = a >= b);
+                    (OperandValues::Column(left), OperandValues::Number(b)) => {
+                        compare(matches, left.into_iter().map(|a| (a, b)), *relation);
+                    }
+                    (OperandValues::Number(a), OperandValues::Column(right)) => {
+                        compare(matches, right.into_iter().map(|b| (a, b)), *relation);
+                    }
+                    (OperandValues::Column(left), OperandValues::Column(right)) => {
+                        compare(matches, left.into_iter().zip(right), *relation);
                     }
                 }
             }
@@ -88,25 +95,39 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// Returns the values of an operand, which is compared with the `other`, for as many points as there are `matches`.
-    fn values(
-        &self,
-        operand: &Operand,
-        other: &Operand,
-        start: usize,
-        matches: &[bool],
-    ) -> Vec<f64> {
-        let n = matches.len();
+    /// Returns the values of an operand, which is compared with the `other`, for `n` points from `start` on.
+    fn values(&self, operand: &Operand, other: &Operand, start: usize, n: usize) -> OperandValues {
         let name = match operand {
-            Operand::Number(number) => return vec![*number; n],
+            Operand::Number(number) => return OperandValues::Number(*number),
             Operand::Column(name) => name,
         };
         let column = self.columns.iter().find(|(known, _)| known == name).map(|(_, column)| column);
         let column = column.expect("columns were found before");
         let has_16_bits = has_16_bits(other);
         let color_unit = if has_16_bits { 1 } else { COLOR_8_TO_16 };
-        column.values(self.cloud, color_unit, start..start + n)
+        OperandValues::Column(column.values(self.cloud, color_unit, start..start + n))
     }
+}
+
+/// Writes for each pair of values whether it has a relation.
+fn compare(matches: &mut [bool], pairs: impl Iterator<Item = (f64, f64)>, relation: Relation) {
+    // Each arm is a loop of its own, so that the relation is examined once, not once a point.
+    match relation {
+        Relation::Equal => fill(matches, pairs, f64::eq),
+        Relation::NotEqual => fill(matches, pairs, f64::ne),
+        Relation::Less => fill(matches, pairs, f64::lt),
+        Relation::LessOrEqual => fill(matches, pairs, f64::le),
+        Relation::Greater => fill(matches, pairs, f64::gt),
+        Relation::GreaterOrEqual => fill(matches, pairs, f64::ge),
+    }
+}
+
+fn fill(
+    matches: &mut [bool],
+    pairs: impl Iterator<Item = (f64, f64)>,
+    holds: impl Fn(&f64, &f64) -> bool,
+) {
+    matches.iter_mut().zip(pairs).for_each(|(is_match, (a, b))| *is_match = holds(&a, &b));
 }
 
 /// Returns true if a channel of a colour that is compared with `other` has 16 bits.

@@ -1,0 +1,121 @@
+//! The points of a file that a filter keeps, read in batches.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use surfel_core::points::{PointCloud, PointFilter};
+
+use super::column_slices::{ColumnSlices, resize, resize_checked, shrink};
+use crate::error::Result;
+use crate::file::Input;
+
+/// Number of points that a task moves from a batch to the cloud.
+const POINTS_PER_TASK: usize = 1 << 14;
+
+/// A cloud that gets those points of batches that a filter keeps.
+pub(crate) struct FilteredCloud<'a> {
+    input: &'a Input<'a>,
+    filter: &'a PointFilter,
+    /// The kept points, and zeros after them.
+    cloud: PointCloud,
+    n_kept: usize,
+    /// The batch that was read last.
+    batch: PointCloud,
+}
+
+impl<'a> FilteredCloud<'a> {
+    /// A cloud with the columns of `empty`, for at most `n_points` points.
+    pub fn new(
+        input: &'a Input,
+        empty: PointCloud,
+        n_points: usize,
+        filter: &'a PointFilter,
+    ) -> Self {
+        let batch = empty.clone();
+        let mut cloud = empty;
+        // Zeros take up memory only once they are written to. If the system has no room even so, the cloud grows with
+        // each batch.
+        resize(&mut cloud, n_points);
+        Self { input, filter, cloud, n_kept: 0, batch }
+    }
+
+    /// Appends the kept points of a batch. `read` gets the points that were kept before, and writes the batch over
+    /// another one.
+    pub fn append(
+        &mut self,
+        read: impl FnOnce(ColumnSlices, &mut PointCloud) -> Result<()>,
+    ) -> Result<()> {
+        let before = ColumnSlices::from_cloud(&mut self.cloud, 0).split_off_front(self.n_kept);
+        read(before, &mut self.batch)?;
+        let matches = self.filter.matches(&self.batch, 0)?;
+        let n_kept = |matches: &[bool]| matches.iter().map(|is_kept| usize::from(*is_kept)).sum();
+        let n_new: usize = n_kept(&matches);
+        if self.cloud.len() < self.n_kept + n_new {
+            resize_checked(&mut self.cloud, self.n_kept + n_new, self.input)?;
+        }
+        let mut from = ColumnSlices::from_cloud(&mut self.batch, 0);
+        let mut to = ColumnSlices::from_cloud(&mut self.cloud, self.n_kept);
+        let tasks: Vec<_> = matches
+            .chunks(POINTS_PER_TASK)
+            .map(|matches| {
+                let from = from.split_off_front(matches.len());
+                (matches, from, to.split_off_front(n_kept(matches)))
+            })
+            .collect();
+        tasks.into_par_iter().for_each(|(matches, from, mut to)| {
+            to.copy_ranges(&from, &ranges(matches));
+        });
+        self.n_kept += n_new;
+        Ok(())
+    }
+
+    /// Returns the points that were kept.
+    pub fn finish(mut self) -> PointCloud {
+        resize(&mut self.cloud, self.n_kept);
+        shrink(&mut self.cloud);
+        self.cloud
+    }
+}
+
+/// Returns the ranges of consecutive set flags.
+fn ranges(flags: &[bool]) -> Vec<Range<usize>> {
+    const WORD: usize = 16;
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    let mut append = |range: Range<usize>| match ranges.last_mut() {
+        Some(last) if last.end == range.start => last.end = range.end,
+        _ => ranges.push(range),
+    };
+    for (word, flags) in flags.chunks(WORD).enumerate() {
+        let start = WORD * word;
+        if flags == [true; WORD] {
+            append(start..start + WORD);
+        } else if flags.contains(&true) {
+            let set = flags.iter().enumerate().filter(|(_, flag)| **flag);
+            set.for_each(|(i, _)| append(start + i..start + i + 1));
+        }
+    }
+    ranges
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ranges of flags.
+
+    use super::*;
+    use surfel_core::math::hash;
+
+    #[test]
+    fn ranges_hold_the_set_flags_and_do_not_touch() {
+        for n in [0, 1, 15, 16, 17, 100, 1000] {
+            for one_of in [1, 2, 3, 100] {
+                let flags: Vec<bool> = (0..n).map(|i| hash(i) % one_of != 0).collect();
+                for flags in [flags.clone(), flags.iter().map(|flag| !flag).collect()] {
+                    let found = ranges(&flags);
+                    assert!(found.windows(2).all(|pair| pair[0].end < pair[1].start));
+                    let set: Vec<usize> = (0..flags.len()).filter(|i| flags[*i]).collect();
+                    assert_eq!(found.into_iter().flatten().collect::<Vec<usize>>(), set);
+                }
+            }
+        }
+    }
+}
