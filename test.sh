@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs every check: formatting, lints, tests, doc tests, tests of the viewer's page and in a browser, those of the Python
-# package, licences, and each benchmark once. Prints the time of each step and ends with a line "N passed, N failed, N skipped"; the exit
+# package, licences, and each benchmark once, in short form. Prints the time of each step and ends with a line "N passed, N failed, N skipped"; the exit
 # status is 0 if nothing failed.
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
@@ -203,6 +203,8 @@ for component in rustfmt clippy; do
 done
 
 check "formatting" cargo fmt --all --check
+check "formatting of the fuzz targets" cargo fmt --manifest-path fuzz/Cargo.toml --check
+check "locked versions of the fuzz targets" cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml --depth 0
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 prepare_gdal
 prepare_ffmpeg

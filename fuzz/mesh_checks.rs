@@ -3,11 +3,12 @@
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::{Geometry, Graph};
-use surfel_formats::{LoadOptions, load_bytes, load_graph_bytes};
+use surfel_formats::{LoadOptions, inspect_bytes, load_bytes, load_graph_bytes};
 
-/// Reads `bytes` as a graph and as a point cloud, whole and salvaged, and checks each.
+/// Reads the header of `bytes`, and all as a graph and as a point cloud, whole and salvaged, and checks each.
 #[allow(dead_code, reason = "the mtl target loads its own file")]
 pub fn check_file(name: &str, bytes: &[u8]) {
+    let _ = inspect_bytes(name, bytes);
     for salvage in [false, true] {
         let options = LoadOptions { salvage, ..LoadOptions::default() };
         if let Ok((graph, source)) = load_graph_bytes(name, bytes, &options, &NoProgress) {

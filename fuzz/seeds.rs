@@ -49,6 +49,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let binary = ply.replace("ascii", &format!("binary_{order}_endian"));
         fs::write(corpus.join(format!("ply/{order}.ply")), binary)?;
     }
+    let names = ["f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2"]
+        .into_iter()
+        .chain(["rot_0", "rot_1", "rot_2", "rot_3", "station", "row_index", "column_index"]);
+    let properties: String = names.map(|name| format!("property float {name}\n")).collect();
+    let splats = format!(
+        "ply\nformat ascii 1.0\ncomment station 1 2 3 0 0 0 1 2 2 a name\nelement vertex 2\n\
+        property float x\nproperty float y\nproperty float z\n{properties}end_header\n\
+        0 0 0 .5 .5 .5 2 -3 -3 -5 1 0 0 0 0 0 0\n1 0 0 .5 0 -.5 9 -3 -2 -5 .5 .5 .5 .5 0 1 1\n"
+    );
+    fs::write(corpus.join("ply/splats.ply"), splats)?;
     write_meshes(&corpus)?;
     let texts = [
         "1 2 3\n4 5 6\n",
@@ -253,7 +263,10 @@ fn write_meshes(corpus: &Path) -> std::io::Result<()> {
     fs::write(corpus.join("stl/binary.stl"), [&[b' '; 80][..], &[1, 0, 0, 0], &facet].concat())?;
     let off = "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 0 0 1 0 1\n1 1 0 1 1 1 1\n0 1 0 9 9 9 9\n4 0 1 2 3\n3 0 1 2 1 1 1\n";
     fs::write(corpus.join("off/colors.off"), off)?;
-    fs::write(corpus.join("off/normals.off"), "NOFF 3 1 0\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1 # c\n3 0 1 2\n")?;
+    fs::write(
+        corpus.join("off/normals.off"),
+        "NOFF 3 1 0\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1 # c\n3 0 1 2\n",
+    )?;
     let mtl = "newmtl m\nKd 0.5 0.25 1\nKs 0.5\nNs 30\nKe 1 2 3\nTf 1 1 1\nNi 1.5\nd 0.5\nTr 0.5\nillum 7\n\
         Pr 0.5\nPm 1\nmap_Kd -s 2 3 1 -o 0.5 -clamp on -mm 0 1 a.png\nmap_Ke b.png\nnorm -bm 2 c.png\n";
     fs::write(corpus.join("mtl/all.mtl"), mtl)?;
@@ -430,19 +443,24 @@ fn write_viewer_input(folder: &Path) -> std::io::Result<()> {
 {"type":"volume","id":4,"points":[[0,0,0],[4,2,1],[0,3,0]],"up":[0,0,1],"base":"mean","cell_size":0.5}
 {"type":"histogram","id":5,"column":"z"}
 {"type":"points","id":6,"format":"laz"}"#,
-        r##"{"type":"set","seq":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"knn:6"}}
+        r##"{"type":"set","seq":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"adaptive:6"}}
 {"type":"set","seq":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
-{"type":"set","seq":3,"scene":{"material":"a.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
+{"type":"set","seq":3,"scene":{"material":"full.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
 {"type":"set","seq":4,"scene":{"surface":null,"material":null,"clip_box":null,"time":0.5,"subsample":"random:5","spp":2}}"##,
         r#"{"type":"size","width":64,"height":32}
 {"type":"save","id":1,"width":30,"height":20}
 {"type":"cancel","id":1}
 {"type":"export","id":2,"width":30,"height":20}
-{"type":"loadScene","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"a.ply\""}
+{"type":"loadScene","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"full.ply\""}
 {"type":"loadScene","id":4,"name":"a.json","text":"{\"surface\": \"sphere\", \"object\": []}"}"#,
         r#"{"type":"set","seq":1,"scene":{"camera":{"orthographic":9,"view_angle":null},"up":[0,1,0],"edge_test":"off"}}
 {"type":"set","seq":2,"scene":{"camera":{"panorama":true,"orthographic":null},"environment":"/etc/passwd"}}
 {"type":"hello","width":3,"height":2}"#,
+        r#"{"type":"ping"}
+{"type":"visible","id":1,"points":[[0,0,0],[4,2,1]]}
+{"type":"movie","id":2,"format":"gif","width":16,"height":12,"fps":5}
+{"type":"addFile","id":3,"name":"b.xyz","n_bytes":12}
+{"type":"cancel","id":2}"#,
     ];
     for (i, page) in pages.iter().enumerate() {
         let page = page.replace("CAMERA", camera);

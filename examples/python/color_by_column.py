@@ -11,7 +11,7 @@ import surfel
 
 
 def main(scan, output, resolution="1920x1080"):
-    points = surfel.prepare(scan, duplicates="keep").points
+    points = surfel.read_cloud(scan).points
     table = pandas.DataFrame(points, columns=["x", "y", "z"])
     table["distance"] = numpy.linalg.norm(points - points.mean(axis=0), axis=1)
 

@@ -17,6 +17,7 @@ use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 use surfel_formats::SaveOptions;
 use surfel_scanner::ruin;
+use surfel_scanner::scenes::SceneView;
 
 /// Arguments of `surfel demo`.
 #[derive(clap::Args, Debug)]
@@ -84,7 +85,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 
 /// The ruin's own view and light.
 fn set_view(description: &mut SceneDescription) -> anyhow::Result<()> {
-    let ruin::RuinView { position, focal_point, view_angle_deg } = ruin::view();
+    let SceneView { position, focal_point, view_angle_deg } = ruin::view();
     let camera = &mut description.camera;
     camera.position = Some(ruin::UTM_ORIGIN + position);
     camera.focal_point = Some(ruin::UTM_ORIGIN + focal_point);

@@ -1,6 +1,7 @@
 //! Virtual laser scanners and scenes of signed distance fields, which give clouds of any size whose true surface is
 //! known.
 
+mod classes;
 mod noise;
 mod sdf;
 mod parts;

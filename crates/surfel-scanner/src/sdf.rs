@@ -1,5 +1,6 @@
 //! Signed distance fields (SDFs), scenes of them, and sphere tracing.
 
+use crate::classes::UNCLASSIFIED;
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;
 
@@ -16,7 +17,7 @@ pub trait Sdf: Send + Sync {
 
     /// Returns the ASPRS class; the default is 1, unclassified.
     fn class(&self) -> u8 {
-        1
+        UNCLASSIFIED
     }
 }
 
@@ -60,6 +61,7 @@ impl SdfScene {
     }
 
     /// Returns the scene with another SDF.
+    #[cfg(test)]
     pub fn with(mut self, sdf: impl Sdf + 'static) -> Self {
         self.add(sdf);
         self

@@ -7,6 +7,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use surfel_core::flat::{FlatPoints, Refit};
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::SurfaceKind;
+use surfel_tests::bench_args::n_points;
 use surfel_tests::clouds::waves;
 use surfel_tests::scenes::columns;
 
@@ -16,8 +17,7 @@ criterion_main!(benches);
 const KIND: SurfaceKind = SurfaceKind::Splat;
 
 fn building(criterion: &mut Criterion) {
-    let n_points = std::env::var("POINTS").ok().and_then(|text| text.parse().ok());
-    let n_points = n_points.unwrap_or(1_000_000);
+    let n_points = n_points(1_000_000);
     let mut group = criterion.benchmark_group("tree");
     group.sample_size(20).throughput(Throughput::Elements(n_points as u64));
     let colors = vec![[188; 3]; n_points];

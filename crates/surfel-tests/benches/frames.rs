@@ -16,10 +16,11 @@ use surfel_core::render::{RenderStats, Renderer, Settings};
 use surfel_core::scene::{
     Background, Camera, Geometry, Graph, Light, Material, Projection, Scene, Sky, Sun,
 };
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::LoadOptions;
 use surfel_gpu::GpuRenderer;
 use surfel_tests::backends;
+use surfel_tests::bench_args::is_timed;
 use surfel_tests::clouds::waves;
 use surfel_tests::scenes;
 
@@ -51,8 +52,7 @@ struct View {
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let options = options(&args);
-    // `cargo test` only checks that the benchmark works.
-    if !args.iter().any(|arg| arg == "--bench") {
+    if !is_timed() {
         let settings = Settings { width: 32, height: 18, ..options.settings };
         let options =
             Options { surfaces: vec![SurfaceKind::Splat], settings, n_runs: 1, ..options };
@@ -135,7 +135,6 @@ fn measure_surfaces(cloud: &PointCloud, view: &View, options: &Options) {
 fn scene(cloud: PointCloud, kind: SurfaceKind, view: &View) -> FlatScene {
     let mut points = scenes::grey(cloud);
     points.surface = kind;
-    points.edge_test = EdgeTest::AngularGap;
     let scene = Scene {
         graph: Graph::from_geometry(Geometry::Points(points), Material::MATTE),
         lights: Vec::new(),

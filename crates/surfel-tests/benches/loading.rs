@@ -2,10 +2,10 @@
 //! the time to read a header alone.
 //!
 //! `cargo bench -p surfel-tests --bench loading`; `POINTS` sets the number of points (by default 12 million of PLY
-//! and PCD, 5 million of LAZ and 3 million of the others).
+//! and PCD, 5 million of LAZ, filters and headers, and 3 million of the others).
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -15,18 +15,11 @@ use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, SaveOptions, inspect, load, load_bytes, save};
+use surfel_tests::bench_args::{is_timed, n_points};
+use surfel_tests::shared_data::shared_data;
 
 criterion_group!(benches, ply, laz, pcd, ptx, e57, text, grid, off, filter, header);
 criterion_main!(benches);
-
-/// Whether `cargo bench` runs this program; `cargo test` only checks that it works.
-fn is_timed() -> bool {
-    std::env::args().any(|argument| argument == "--bench")
-}
-
-fn n_points(usual: usize) -> usize {
-    std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
-}
 
 fn ply(criterion: &mut Criterion) {
     let n_points = n_points(12_000_000);
@@ -44,9 +37,8 @@ fn ply(criterion: &mut Criterion) {
 
 fn laz(criterion: &mut Criterion) {
     let generated = file(&survey(n_points(5_000_000)), "laz");
-    let scan = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/clouds/ign_lidar_697k.laz");
-    for path in [&scan, &generated] {
+    let scan = shared_data().map(|folder| folder.join("clouds/ign_lidar_697k.laz"));
+    for path in scan.iter().chain([&generated]) {
         let Ok(bytes) = std::fs::read(path) else {
             report(&format!("skipped: {} is absent", path.display()));
             continue;

@@ -10,25 +10,20 @@ use surfel_core::points::neighbors::{NeighborMethod, Neighborhood, map_neighborh
 use surfel_core::points::{CleanOptions, clean, fit_plane, orient, prepare, subsample};
 use surfel_core::points::{Orientation, PointCloud, Preparation, Subsample};
 use surfel_core::progress::NoProgress;
+use surfel_tests::bench_args;
+use surfel_tests::clouds::waves;
 
 criterion_group!(benches, normals, steps);
 criterion_main!(benches);
 
-fn n_points() -> usize {
-    std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000)
+/// Returns the points in the order of a scanner: row by row.
+fn in_scan_order() -> Vec<Vec3> {
+    waves(n_points(), 0.0).positions
 }
 
-/// Returns points of a wavy surface in the order of a scanner: row by row, at random positions in unit squares.
-fn in_scan_order() -> Vec<Vec3> {
-    let n_points = n_points();
-    let row_length = n_points.isqrt();
-    let mut random = Random::new(1, 0);
-    let point = |i| {
-        let x = (i / row_length) as f32 + random.next_f32();
-        let y = (i % row_length) as f32 + random.next_f32();
-        Vec3::new(x, y, 20.0 * (0.02 * x).sin() * (0.03 * y).cos())
-    };
-    (0..n_points).map(point).collect()
+/// Returns the number of points.
+fn n_points() -> usize {
+    bench_args::n_points(1_000_000)
 }
 
 fn shuffled(mut positions: Vec<Vec3>) -> Vec<Vec3> {

@@ -2,7 +2,7 @@
 //! until cancelled work stops.
 //!
 //! `cargo bench -p surfel-tests --bench scenes`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the number
-//! of points at rest (10 million by default).
+//! of points (by default 10 million at rest, and a million that move, of several objects and of the cancelled picture).
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -17,15 +17,12 @@ use surfel_core::scene::{
     Primitive, Projection, Scene, Skin, Sky, Sun, Transform,
 };
 use surfel_core::trace::{InstanceFilter, SceneHit, Simd, scene_hits};
+use surfel_tests::bench_args::{is_timed, n_points};
 use surfel_tests::clouds::waves;
 use surfel_tests::scenes;
 
 criterion_group!(benches, moving, deforming, several_objects, cancelling);
 criterion_main!(benches);
-
-fn n_points(usual: usize) -> usize {
-    std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
-}
 
 fn cloud(n: usize) -> CloudGeometry {
     scenes::grey(waves(n, 0.0))
@@ -210,8 +207,7 @@ fn several_objects(criterion: &mut Criterion) {
     group.bench_function("together", |bencher| bencher.iter(&mut all));
     group.bench_function("each on its own", |bencher| bencher.iter(&mut each));
     group.finish();
-    // `cargo test` only checks that the benchmark works.
-    if std::env::args().any(|argument| argument == "--bench") {
+    if is_timed() {
         let [median, least] = ratio_in_turn(&mut all, &mut each);
         println!(
             "together : each on its own, in turn: {median:.3} (median), {least:.3} (least times)"
@@ -247,7 +243,7 @@ impl Progress for CancelAt {
 fn cancelling(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("cancelled picture");
     group.sample_size(50);
-    let points = Geometry::Points(cloud(1_000_000));
+    let points = Geometry::Points(cloud(n_points(1_000_000)));
     let sun =
         Sun { direction: Vec3::new(0.6, 0.0, 0.8), color: Vec3::ONE, angular_diameter_deg: 0.5 };
     let (zenith, ground) = (Vec3::splat(0.3), Vec3::splat(0.1));

@@ -1,7 +1,7 @@
 //! Point clouds of shapes with closed forms, with their exact normals.
 
 use std::f32::consts::PI;
-use surfel_core::math::{DVec3, Random, Vec3};
+use surfel_core::math::{DVec3, Random, Vec3, hash};
 use surfel_core::points::PointCloud;
 
 /// Returns `n` points of a sphere about the origin on a Fibonacci lattice: each represents the same area.
@@ -97,6 +97,16 @@ pub fn waves(n_points: usize, phase: f32) -> PointCloud {
         normals.push(Vec3::new(-0.4 * cos_x * cos_y, 0.6 * sin_x * sin_y, 1.0).normalize());
     }
     PointCloud { normals: Some(normals), radii: Some(radii), ..cloud }
+}
+
+/// Returns a cloud whose normals have random signs.
+pub fn with_random_signs(mut cloud: PointCloud) -> PointCloud {
+    for (i, normal) in cloud.normals.iter_mut().flatten().enumerate() {
+        if hash(i as u64) & 1 == 1 {
+            *normal = -*normal;
+        }
+    }
+    cloud
 }
 
 /// Returns a copy of a cloud far from the origin, like a survey in the coordinates of a national grid.

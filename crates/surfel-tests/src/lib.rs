@@ -1,5 +1,6 @@
 //! Scenes, clouds and ground truth that the tests and benchmarks of all crates share.
 
+pub mod bench_args;
 pub mod skipped;
 pub mod shared_data;
 pub mod cancel_after;

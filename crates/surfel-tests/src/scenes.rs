@@ -14,7 +14,7 @@ use surfel_core::scene::{
     Background, Camera, CloudGeometry, Geometry, Graph, Light, Material, Mesh, Node, Primitive,
     Projection, Scene, Transform,
 };
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 
 /// The kinds of surface that are the zeros of a field, which has a structure of its own.
@@ -49,7 +49,6 @@ pub fn prepared(
     let mut points = grey(if surface == SurfaceKind::Gaussian { trained(cloud) } else { cloud });
     points.surface = surface;
     points.shows_trained_colors = false;
-    points.edge_test = EdgeTest::AngularGap;
     points
 }
 
@@ -98,24 +97,30 @@ pub fn columns<'a>(
 
 /// Returns `points` with other colours.
 pub fn colored(points: &CloudGeometry, colors: Vec<[u8; 3]>) -> CloudGeometry {
-    let mut colored = CloudGeometry::new(points.cloud().clone(), colors).unwrap();
-    colored.surface = points.surface;
-    colored.edge_test = points.edge_test;
-    colored.has_outward_normals = points.has_outward_normals;
-    colored.shows_trained_colors = points.shows_trained_colors;
-    colored
+    let cloud = CloudGeometry::new(points.cloud().clone(), colors).unwrap();
+    with_settings_of(points, cloud)
 }
 
 /// Returns `points` with a changed cloud of the same number of points.
 pub fn changed(points: &CloudGeometry, change: impl FnOnce(&mut PointCloud)) -> CloudGeometry {
     let mut cloud = points.cloud().clone().into_inner();
     change(&mut cloud);
-    let mut changed = grey(cloud);
-    changed.surface = points.surface;
-    changed.edge_test = points.edge_test;
-    changed.has_outward_normals = points.has_outward_normals;
-    changed.shows_trained_colors = points.shows_trained_colors;
-    colored(&changed, points.colors().to_vec())
+    let cloud = PreparedCloud::new(cloud).unwrap();
+    with_settings_of(points, CloudGeometry::new(cloud, points.colors().to_vec()).unwrap())
+}
+
+/// Returns `cloud` with the settings of `points`.
+fn with_settings_of(points: &CloudGeometry, mut cloud: CloudGeometry) -> CloudGeometry {
+    cloud.surface = points.surface;
+    cloud.options = points.options;
+    cloud.edge_test = points.edge_test;
+    cloud.octree_depth = points.octree_depth;
+    cloud.blends_colors = points.blends_colors;
+    cloud.support_colors = points.support_colors;
+    cloud.shows_trained_colors = points.shows_trained_colors;
+    cloud.has_outward_normals = points.has_outward_normals;
+    cloud.has_front_sides = points.has_front_sides;
+    cloud
 }
 
 /// `points` with normals that point out of what they enclose.

@@ -1,6 +1,6 @@
 //! Airborne laser scanners: pulses across flight lines, each with several returns.
 
-use super::instrument::{Instrument, check_positive, check_size};
+use super::instrument::{Instrument, check, check_not_negative, check_positive, check_size};
 use super::returns::{Return, into_cloud};
 use crate::sdf::{DRay, SdfHit, SdfScene};
 use rayon::prelude::*;
@@ -144,6 +144,12 @@ impl Instrument for AirborneLidar {
         check_positive("line_step", self.line_step)?;
         check_positive("pulse_step_rad", self.pulse_step_rad)?;
         check_positive("max_range", self.max_range)?;
+        check_not_negative("range_noise", self.range_noise)?;
+        for line in &self.lines {
+            check_positive("length of a flight line", line.length())?;
+            let height = line.to.z - line.from.z;
+            check(height == 0.0, "height of a flight line", height, "no rise, as lines are level")?;
+        }
         let n_rows = |line: &FlightLine| (line.length() / self.line_step) as usize;
         let n_pulses = 2.0 * self.max_scan_angle_rad / self.pulse_step_rad;
         let length: f64 = self.lines.iter().map(FlightLine::length).sum();
@@ -166,7 +172,7 @@ impl Instrument for AirborneLidar {
             counts.push(pulse_return.n_returns);
             angles.push(pulse_return.scan_angle_deg);
         }
-        let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
+        let mut cloud = into_cloud(&returns, DVec3::ZERO);
         let scalars = [
             ("return_number", Values::U8(numbers)),
             ("number_of_returns", Values::U8(counts)),

@@ -1,9 +1,10 @@
 //! Depth cameras: grids of depths whose noise grows with the square of the depth.
 
-use super::instrument::{Instrument, check_positive, check_size};
-use super::returns::{Return, add_grid, into_cloud};
+use super::instrument::{Instrument, check, check_not_negative, check_positive, check_size};
+use super::returns::{Return, into_cloud};
 use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 use surfel_core::Result;
 use surfel_core::math::DVec3;
 use surfel_core::math::Random;
@@ -29,8 +30,6 @@ pub struct DepthCamera {
     pub max_depth: f64,
     /// Seed of the noise.
     pub seed: u64,
-    /// True to add the stations, and the columns of the station, row and column of each point.
-    pub with_grid: bool,
 }
 
 impl Default for DepthCamera {
@@ -45,7 +44,6 @@ impl Default for DepthCamera {
             step_at_1_m: 0.0008,
             max_depth: 8.0,
             seed: 1,
-            with_grid: false,
         }
     }
 }
@@ -72,7 +70,7 @@ impl DepthCamera {
             let stream = ((pose_idx as u64) << 40) | (y * self.width + x) as u64;
             let mut random = Random::new(self.seed, stream);
             let range = self.measured(hit.distance * cosine, &mut random) / cosine;
-            Some(Return::new(scene, &ray, hit, range, pose_idx as u16 + 1).in_cell(y, x))
+            Some(Return::new(scene, &ray, hit, range, pose_idx as u16 + 1))
         };
         (0..self.width).filter_map(scan_pixel).collect()
     }
@@ -91,7 +89,14 @@ impl DepthCamera {
 impl Instrument for DepthCamera {
     /// Returns points ordered by picture, row and column.
     fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
-        check_positive("view_angle_rad", self.view_angle_rad)?;
+        let is_angle = 0.0 < self.view_angle_rad && self.view_angle_rad < PI;
+        check(is_angle, "view_angle_rad", self.view_angle_rad, "between 0 and pi")?;
+        check_not_negative("noise_at_1_m", self.noise_at_1_m)?;
+        check_not_negative("step_at_1_m", self.step_at_1_m)?;
+        for (position, target) in &self.poses {
+            let level = (target - position).truncate().length();
+            check(0.0 < level, "direction of a pose", level, "one that is not vertical")?;
+        }
         check_positive("max_depth", self.max_depth)?;
         check_size(
             self.poses.len(),
@@ -107,12 +112,7 @@ impl Instrument for DepthCamera {
         let rows: Vec<Vec<Return>> =
             (0..n_rows).into_par_iter().map(scan_row).collect::<Result<_>>()?;
         let returns: Vec<Return> = rows.into_iter().flatten().collect();
-        let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
-        if self.with_grid {
-            let positions: Vec<DVec3> = self.poses.iter().map(|(position, _)| *position).collect();
-            add_grid(&mut cloud, &returns, &positions);
-        }
-        Ok(cloud)
+        Ok(into_cloud(&returns, DVec3::ZERO))
     }
 
     fn viewpoints(&self, point: DVec3) -> Vec<DVec3> {

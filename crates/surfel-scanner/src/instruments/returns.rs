@@ -10,7 +10,6 @@ use surfel_core::points::{
 /// The return of one ray.
 pub struct Return {
     pub position: Vec3,
-    normal: Vec3,
     color: [u16; 3],
     intensity: f32,
     class: u8,
@@ -30,7 +29,6 @@ impl Return {
         let incidence = normal.dot(-ray.direction).max(0.0);
         Self {
             position: (ray.origin + range * ray.direction).as_vec3(),
-            normal: normal.as_vec3(),
             color: color.to_array().map(|c| (c * 255.0).round() as u16 * COLOR_8_TO_16),
             intensity: intensity(f64::from(color.element_sum()) / 3.0, incidence, hit.distance),
             class: sdf.class(),
@@ -46,14 +44,13 @@ impl Return {
 }
 
 /// Returns the cloud of all returns; `origin` are the world coordinates of the scene's origin.
-pub fn into_cloud(returns: &[Return], origin: DVec3, with_normals: bool) -> PointCloud {
+pub fn into_cloud(returns: &[Return], origin: DVec3) -> PointCloud {
     fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Vec<T> {
         returns.iter().map(value).collect()
     }
     PointCloud {
         origin,
         positions: column(returns, |r| r.position),
-        normals: with_normals.then(|| column(returns, |r| r.normal)),
         colors: Some(column(returns, |r| r.color)),
         intensity: Some(column(returns, |r| r.intensity)),
         classification: Some(column(returns, |r| r.class)),

@@ -1,6 +1,6 @@
 //! Spinning laser scanners on a vehicle: rings of rays about the vertical axis, driven along a path.
 
-use super::instrument::{Instrument, check_positive, check_size};
+use super::instrument::{Instrument, check_not_negative, check_positive, check_size};
 use super::returns::{Return, into_cloud};
 use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ pub struct SpinningLidar {
     /// Revolutions per second.
     pub rotation_hz: f64,
     /// Number of rings.
-    pub n_rings: u32,
+    pub n_rings: u16,
     /// Lowest and highest elevation of the rings in radians above the horizon.
     pub elevation_rad: (f64, f64),
     /// Number of azimuths per revolution.
@@ -73,7 +73,7 @@ impl SpinningLidar {
         ((self.path_length() / self.speed * self.rotation_hz).round() as usize).max(1)
     }
 
-    fn ray(&self, column: usize, ring: u32) -> DRay {
+    fn ray(&self, column: usize, ring: u16) -> DRay {
         let revolutions = column as f64 / f64::from(self.n_azimuths);
         let origin = self.position(revolutions / self.rotation_hz * self.speed);
         let (sin, cos) = (-TAU * revolutions).sin_cos();
@@ -85,12 +85,12 @@ impl SpinningLidar {
 
     fn scan_column(&self, scene: &SdfScene, column: usize) -> Vec<(u16, f64, Return)> {
         let time = column as f64 / f64::from(self.n_azimuths) / self.rotation_hz;
-        let scan_ring = |ring: u32| {
+        let scan_ring = |ring: u16| {
             let ray = self.ray(column, ring);
             let hit = scene.first_hit(&ray, self.max_range)?;
             let mut random = Random::new(self.seed, ((column as u64) << 32) | u64::from(ring));
             let range = hit.distance + self.range_noise * random.next_gaussian();
-            Some((ring as u16, time, Return::new(scene, &ray, hit, range, 1)))
+            Some((ring, time, Return::new(scene, &ray, hit, range, 1)))
         };
         (0..self.n_rings).filter_map(scan_ring).collect()
     }
@@ -102,10 +102,11 @@ impl Instrument for SpinningLidar {
     fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
         check_positive("speed", self.speed)?;
         check_positive("rotation_hz", self.rotation_hz)?;
+        check_not_negative("range_noise", self.range_noise)?;
         check_positive("max_range", self.max_range)?;
         let n_revolutions = self.path_length() / self.speed * self.rotation_hz;
         let n_rays = n_revolutions.max(1.0) * f64::from(self.n_azimuths) * f64::from(self.n_rings);
-        check_size(1, n_rays)?;
+        check_size(self.path.len().min(1), n_rays)?;
         let n_columns = self.n_revolutions() * self.n_azimuths as usize;
         progress.begin("scan", n_columns as u64);
         let scan_column = |column| {
@@ -121,7 +122,7 @@ impl Instrument for SpinningLidar {
             times.push(time);
             returns.push(found);
         }
-        let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
+        let mut cloud = into_cloud(&returns, DVec3::ZERO);
         cloud.scalars.push(Scalar { name: "ring".to_owned(), values: Values::U16(rings) });
         cloud.scalars.push(Scalar { name: "gps_time".to_owned(), values: Values::F64(times) });
         if let [position] = self.path[..] {

@@ -1,16 +1,16 @@
 //! Terrestrial laser scanners: rays from stations, each of which gives at most one point.
 
-use super::instrument::{Instrument, check_size};
+use super::instrument::{Instrument, check, check_not_negative, check_positive, check_size};
 use super::returns::{Return, add_grid, into_cloud};
 use super::station::Station;
 use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
+use surfel_core::Result;
 use surfel_core::math::DVec3;
 use surfel_core::math::Random;
 use surfel_core::math::hash;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::{Error, Result};
 
 /// The properties of a scanner, the same at every station.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +25,6 @@ pub struct Scanner {
     pub seed: u64,
     /// World coordinates of the scene's origin.
     pub origin: DVec3,
-    /// True to add the true unit normals.
-    pub with_normals: bool,
     /// True to add the stations, and the columns of the station, row and column of each point.
     pub with_grid: bool,
 }
@@ -39,7 +37,6 @@ impl Default for Scanner {
             max_range: 120.0,
             seed: 1,
             origin: DVec3::ZERO,
-            with_normals: false,
             with_grid: false,
         }
     }
@@ -80,7 +77,7 @@ impl Scanner {
                 .collect::<Result<_>>()?;
             returns.extend(columns.into_iter().flatten());
         }
-        let mut cloud = into_cloud(&returns, self.origin, self.with_normals);
+        let mut cloud = into_cloud(&returns, self.origin);
         if self.with_grid {
             let positions: Vec<DVec3> = stations.iter().map(|station| station.position).collect();
             add_grid(&mut cloud, &returns, &positions);
@@ -89,19 +86,10 @@ impl Scanner {
     }
 
     fn validate(&self) -> Result<()> {
-        let invalid = |name, found: f64, expected| {
-            Err(Error::Setting { name, found: found.to_string(), expected })
-        };
-        if !(1e-5 <= self.step_rad && self.step_rad <= 1.0) {
-            return invalid("step_rad", self.step_rad, "between 0.00001 and 1");
-        }
-        if !(0.0 <= self.range_noise && self.range_noise.is_finite()) {
-            return invalid("range_noise", self.range_noise, "0 or more metres");
-        }
-        if !(0.0 < self.max_range && self.max_range.is_finite()) {
-            return invalid("max_range", self.max_range, "a positive number of metres");
-        }
-        Ok(())
+        let is_valid_step = (1e-5..=1.0).contains(&self.step_rad);
+        check(is_valid_step, "step_rad", self.step_rad, "between 0.00001 and 1")?;
+        check_not_negative("range_noise", self.range_noise)?;
+        check_positive("max_range", self.max_range)
     }
 
     /// Scans the rays of one azimuth.
@@ -163,6 +151,7 @@ mod tests {
 
     use super::*;
     use crate::parts::primitives::{Plane, SphereSdf};
+    use surfel_core::Error;
     use surfel_core::math::DVec2;
     use surfel_core::math::Vec3;
     use surfel_core::points::Values;
@@ -171,7 +160,7 @@ mod tests {
     const WHITE: Vec3 = Vec3::ONE;
 
     fn scanner(step_deg: f64) -> Scanner {
-        Scanner { step_rad: step_deg.to_radians(), with_normals: true, ..Scanner::default() }
+        Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() }
     }
 
     fn ball(center: DVec3) -> SphereSdf {
@@ -186,12 +175,11 @@ mod tests {
         let cloud =
             scanner.scan(&SdfScene::default().with(sphere), &[station], &NoProgress).unwrap();
         assert!(3000 < cloud.len(), "{}", cloud.len());
-        for (position, normal) in cloud.positions.iter().zip(cloud.normals.as_ref().unwrap()) {
+        for position in &cloud.positions {
             let offset = position.as_dvec3() - sphere.center;
             let slack = 5.0 * scanner.range_noise + 1e-4;
             assert!((offset.length() - sphere.radius).abs() < slack);
             assert!(offset.normalize().dot(-position.as_dvec3().normalize()) > -0.2);
-            assert!(offset.normalize().dot(normal.as_dvec3()) > 0.999);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Bodies that are smooth all over: a head on a plinth and a cow.
 
 use super::assembly::{Assembly, Solid};
+use crate::classes::UNCLASSIFIED;
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;
@@ -31,7 +32,12 @@ impl Head {
             Solid::ellipsoid([-0.39, 0.05, 0.62], [0.05, 0.09, 0.13]), // ears
             Solid::ellipsoid([0.39, 0.05, 0.62], [0.05, 0.09, 0.13]),
         ];
-        let shape = Assembly { solids, blend: 0.06, color: Vec3::new(0.8, 0.68, 0.58), class: 1 };
+        let shape = Assembly {
+            solids,
+            blend: 0.06,
+            color: Vec3::new(0.8, 0.68, 0.58),
+            class: UNCLASSIFIED,
+        };
         Self { shape: moved(shape, base) }
     }
 }
@@ -57,7 +63,7 @@ impl Cow {
             leg(-0.24, 0.65),
             leg(0.24, 0.65),
         ];
-        let shape = Assembly { solids, blend: 0.1, color: Vec3::ONE, class: 1 };
+        let shape = Assembly { solids, blend: 0.1, color: Vec3::ONE, class: UNCLASSIFIED };
         Self { shape: moved(shape, base) }
     }
 }

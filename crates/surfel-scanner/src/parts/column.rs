@@ -1,7 +1,8 @@
 //! Fluted columns and their drums, which stand on z = 0 of their own frame.
 
-use super::masonry::{BUILDING, box_distance, groove, joint_shade};
+use super::masonry::{box_distance, groove, joint_shade};
 use super::stone;
+use crate::classes::BUILDING;
 use crate::noise::mix;
 use crate::sdf::{DAabb, Sdf};
 use std::f64::consts::PI;

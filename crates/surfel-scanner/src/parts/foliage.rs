@@ -1,6 +1,7 @@
 //! Shrubs and cypresses: ellipsoids with a rough surface.
 
 use super::stone;
+use crate::classes::MEDIUM_VEGETATION;
 use crate::noise::{fbm, unit};
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
@@ -47,6 +48,6 @@ impl Sdf for Foliage {
 
     /// Returns the ASPRS class 'medium vegetation'.
     fn class(&self) -> u8 {
-        4
+        MEDIUM_VEGETATION
     }
 }

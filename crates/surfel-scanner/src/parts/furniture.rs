@@ -1,6 +1,7 @@
 //! Furniture of boxes and capsules with sharp edges.
 
 use super::assembly::{Assembly, Solid};
+use crate::classes::UNCLASSIFIED;
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;
 
@@ -9,7 +10,7 @@ const CLOTH: Vec3 = Vec3::new(0.35, 0.42, 0.5);
 const PAINT: Vec3 = Vec3::new(0.85, 0.84, 0.8);
 
 fn furniture(solids: Vec<Solid>, color: Vec3) -> Assembly {
-    Assembly { solids, blend: 0.0, color, class: 1 }
+    Assembly { solids, blend: 0.0, color, class: UNCLASSIFIED }
 }
 
 fn block(center: DVec3, offset: [f64; 3], half: [f64; 3]) -> Solid {

@@ -1,6 +1,7 @@
 //! A house with recessed windows and a door under a gabled roof.
 
-use super::masonry::{BUILDING, box_distance};
+use super::masonry::box_distance;
+use crate::classes::BUILDING;
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;

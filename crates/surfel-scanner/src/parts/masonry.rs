@@ -1,15 +1,13 @@
 //! Walls and arches of blocks, which stand on z = 0 of their own frame, and a polished ball.
 
 use super::stone;
+use crate::classes::BUILDING;
 use crate::noise::{noise, unit};
 use crate::sdf::{DAabb, Sdf};
 use std::f64::consts::PI;
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;
 use surfel_core::math::hash;
-
-/// The ASPRS class 'building'.
-pub const BUILDING: u8 = 6;
 
 /// A box of blocks in running bond with worn edges.
 pub struct Ashlar {

@@ -1,6 +1,7 @@
 //! The inside of a room: floor, ceiling and walls.
 
-use super::masonry::{BUILDING, box_distance};
+use super::masonry::box_distance;
+use crate::classes::BUILDING;
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;

@@ -1,6 +1,7 @@
 //! A road between pavements with kerbs.
 
 use super::stone;
+use crate::classes::GROUND;
 use crate::noise::{fbm, smoothstep};
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
@@ -16,8 +17,6 @@ pub struct StreetGround {
 
 const KERB: f64 = 0.14;
 const KERB_WIDTH: f64 = 0.04;
-const GROUND: u8 = 2;
-
 impl StreetGround {
     /// Returns the height of the ground.
     pub fn height(&self, x: f64, y: f64) -> f64 {

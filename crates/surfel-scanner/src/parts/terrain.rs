@@ -1,6 +1,7 @@
-//! Rough ground around the ruin.
+//! Rough ground around ruins and under trees.
 
 use super::stone;
+use crate::classes::GROUND;
 use crate::noise::{fbm, mix, noise, smoothstep};
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
@@ -14,8 +15,6 @@ pub struct Terrain {
     pub platform: (f64, f64),
 }
 
-/// The ASPRS class 'ground'.
-const GROUND: u8 = 2;
 /// Maximum height in metres.
 const MAX_HEIGHT: f64 = 1.6;
 

@@ -1,6 +1,7 @@
 //! Crowns of trees: leaves in the cells of a grid.
 
 use super::stone;
+use crate::classes::HIGH_VEGETATION;
 use crate::noise::{noise, unit};
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
@@ -36,9 +37,6 @@ pub struct Crown {
 const HALF_THICKNESS: f64 = 0.004;
 /// Distance that leaves keep from the faces of their cell.
 const MARGIN: f64 = 0.012;
-/// The ASPRS class 'high vegetation'.
-const HIGH_VEGETATION: u8 = 5;
-
 impl Crown {
     /// Returns less than 1 inside of the outline, and more outside.
     fn level(&self, point: DVec3) -> f64 {

@@ -1,6 +1,7 @@
 //! Wires that hang between two points.
 
 use super::assembly::segment_distance;
+use crate::classes::WIRE_CONDUCTOR;
 use crate::sdf::{DAabb, Sdf};
 use surfel_core::math::DVec3;
 use surfel_core::math::Vec3;
@@ -10,9 +11,6 @@ pub struct Wire {
     nodes: Vec<DVec3>,
     radius: f64,
 }
-
-/// The ASPRS class 'wire, conductor'.
-const WIRE_CONDUCTOR: u8 = 14;
 
 impl Wire {
     /// Creates a wire between two ends whose middle hangs lower by `sag`.

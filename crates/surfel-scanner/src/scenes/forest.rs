@@ -1,6 +1,7 @@
 //! A forest of spruces and oaks on rolling ground.
 
 use super::named_scene::NamedScene;
+use crate::classes::HIGH_VEGETATION;
 use crate::instruments::{AirborneLidar, FlightLine, Scanner, Station, TerrestrialSurvey};
 use crate::noise::unit;
 use crate::parts::assembly::{Assembly, Solid};
@@ -41,7 +42,7 @@ fn add_tree(scene: &mut NamedScene, column: f64, row: f64, seed: u64) {
     let top = foot + (if is_spruce { 0.9 } else { 0.6 }) * height * DVec3::Z;
     let solids = vec![Solid::capsule(foot.into(), top.into(), 0.1 + 0.012 * height)];
     let bark = Vec3::new(0.34, 0.28, 0.22);
-    scene.add("trunk", Assembly { solids, blend: 0.0, color: bark, class: 5 });
+    scene.add("trunk", Assembly { solids, blend: 0.0, color: bark, class: HIGH_VEGETATION });
     let (shape, half, rise) = if is_spruce {
         (CrownShape::Cone, DVec3::new(1.5, 1.5, 0.44 * height), 0.58)
     } else {

@@ -1,6 +1,7 @@
 //! The demo scene: a temple in ruins, 30 metres across.
 
 use super::named_scene::{NamedScene, SceneView};
+use crate::classes::{BUILDING, GROUND, MEDIUM_VEGETATION};
 use crate::instruments::{Scanner, Station, TerrestrialSurvey};
 use crate::noise::unit;
 use crate::parts::column::{ColumnSdf, Drum};
@@ -14,9 +15,6 @@ use surfel_core::math::DVec3;
 use surfel_core::math::hash;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-
-/// The camera of the ruin.
-pub type RuinView = SceneView;
 
 /// Height of the platform that the columns stand on.
 pub const FLOOR: f64 = 1.05;
@@ -47,8 +45,8 @@ pub fn scene() -> SdfScene {
 }
 
 /// Returns a three-quarter view for an aspect ratio of 16 to 9.
-pub fn view() -> RuinView {
-    RuinView {
+pub fn view() -> SceneView {
+    SceneView {
         position: DVec3::new(-15.5, -20.5, 6.8),
         focal_point: DVec3::new(1.6, 0.0, 2.2),
         view_angle_deg: 32.5,
@@ -80,9 +78,9 @@ pub fn stations() -> [Station; 6] {
 pub fn named_scene() -> NamedScene {
     let sdf = scene();
     let name = |part_idx: usize| match sdf.part(part_idx).class() {
-        2 => "ground",
-        4 => "plants",
-        6 => "masonry",
+        GROUND => "ground",
+        MEDIUM_VEGETATION => "plants",
+        BUILDING => "masonry",
         _ => "ball",
     };
     let object_names = (0..sdf.n_parts()).map(name).collect();
@@ -324,7 +322,7 @@ mod tests {
 
     #[test]
     fn the_view_shows_the_ball() {
-        let RuinView { position, focal_point, .. } = view();
+        let SceneView { position, focal_point, .. } = view();
         let toward_ball = (BALL_CENTER - position).normalize();
         assert!(0.95 < toward_ball.dot((focal_point - position).normalize()));
         let ray = DRay { origin: position, direction: toward_ball };

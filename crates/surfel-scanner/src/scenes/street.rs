@@ -1,12 +1,12 @@
 //! A street: ground, a house with recesses, a head, a cow, poles with a wire, and a tree.
 
 use super::named_scene::NamedScene;
+use crate::classes::{BUILDING, HIGH_VEGETATION, TRANSMISSION_TOWER};
 use crate::instruments::TerrestrialSurvey;
 use crate::instruments::{AirborneLidar, FlightLine, Scanner, SpinningLidar, Station};
 use crate::parts::assembly::{Assembly, Solid};
 use crate::parts::body::{Cow, Head};
 use crate::parts::house::House;
-use crate::parts::masonry::BUILDING;
 use crate::parts::street_ground::StreetGround;
 use crate::parts::tree::{Crown, CrownShape};
 use crate::parts::wire::Wire;
@@ -31,7 +31,10 @@ pub fn scene() -> NamedScene {
     for foot in POLES {
         let top = foot + POLE_HEIGHT * DVec3::Z;
         let solids = vec![Solid::capsule(foot.into(), top.into(), 0.11)];
-        scene.add("pole", Assembly { solids, blend: 0.0, color: Vec3::splat(0.45), class: 15 });
+        scene.add(
+            "pole",
+            Assembly { solids, blend: 0.0, color: Vec3::splat(0.45), class: TRANSMISSION_TOWER },
+        );
     }
     for side in [-0.25, 0.25] {
         let [from, to] = POLES.map(|foot| foot + DVec3::new(0.0, side, POLE_HEIGHT - 0.1));
@@ -44,7 +47,7 @@ pub fn scene() -> NamedScene {
         Solid::capsule([9.5, 5.5, 2.6], [9.4, 6.4, 4.6], 0.07),
     ];
     let bark = Vec3::new(0.36, 0.29, 0.22);
-    scene.add("trunk", Assembly { solids: trunk, blend: 0.1, color: bark, class: 5 });
+    scene.add("trunk", Assembly { solids: trunk, blend: 0.1, color: bark, class: HIGH_VEGETATION });
     let center = TREE + 4.4 * DVec3::Z;
     let half = DVec3::new(2.1, 2.1, 1.9);
     let crown =

@@ -16,10 +16,10 @@ mod sampled;
 mod scans;
 
 use selection::Selection;
+use surfel_tests::bench_args::is_timed;
 
 fn main() {
-    // `cargo test` only checks that the program works.
-    if !std::env::args().any(|argument| argument == "--bench") {
+    if !is_timed() {
         sampled::check();
         scans::check();
         return;

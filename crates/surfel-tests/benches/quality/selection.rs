@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use surfel_core::surface::SurfaceKind;
+use surfel_tests::bench_args::take_folder;
 
 /// The surfaces and clouds to compare, and the folders to read and write.
 pub struct Selection {
@@ -17,7 +18,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Parses the command line. Without the name of a kind it is `splat` and, where there is one, `smooth`.
+    /// Parses the command line. Without the name of a kind they are `splat` and `smooth`.
     ///
     /// # Panics
     ///
@@ -41,11 +42,4 @@ impl Selection {
     pub fn includes(&self, cloud: &str) -> bool {
         self.filters.is_empty() || self.filters.iter().any(|filter| cloud.contains(filter))
     }
-}
-
-/// Removes an option and its folder from the arguments, and returns the folder.
-fn take_folder(args: &mut Vec<String>, name: &str) -> Option<PathBuf> {
-    let at = args.iter().position(|word| word == name)?;
-    let mut taken = args.drain(at..=at + 1);
-    taken.nth(1).map(PathBuf::from)
 }

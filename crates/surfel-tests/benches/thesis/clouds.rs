@@ -4,7 +4,7 @@ use surfel_core::math::{DVec3, Random, Vec3};
 use surfel_core::points::{PointCloud, PreparedCloud, prepare};
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Projection, fit_camera};
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::surface::SurfaceKind;
 use surfel_scanner::scenes::ruin;
 use surfel_tests::clouds;
 use surfel_tests::ground_truth::GroundTruth;
@@ -48,7 +48,6 @@ impl Subject {
         let cloud = PreparedCloud::new(cloud).unwrap();
         let mut geometry = CloudGeometry::with_uniform_color(cloud, [188; 3]);
         geometry.surface = kind;
-        geometry.edge_test = EdgeTest::AngularGap;
         geometry
     }
 
@@ -69,11 +68,7 @@ impl Subject {
 
     /// Returns the same points with normals of random sign.
     pub fn with_random_signs(&self) -> Self {
-        let mut cloud = self.cloud.clone().into_inner();
-        let mut random = Random::new(8, 0);
-        for normal in cloud.normals.iter_mut().flatten() {
-            *normal *= if random.next_f32() < 0.5 { -1.0 } else { 1.0 };
-        }
+        let cloud = clouds::with_random_signs(self.cloud.clone().into_inner());
         Self { cloud: PreparedCloud::new(cloud).unwrap(), ..*self }
     }
 }
@@ -116,7 +111,7 @@ pub fn ruin_scan() -> Subject {
     Subject { name: "Ruin, 1,078k", cloud: prepared(cloud), camera }
 }
 
-/// Returns 172,974 evenly spaced points of a head.
+/// Returns 172,974 random points of a head.
 pub fn head() -> Subject {
     let mesh = GroundTruth::from_mesh(&shapes::head());
     let positions = Sampling::Random.sample(&mesh, 172_974, 1);

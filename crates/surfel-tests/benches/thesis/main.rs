@@ -16,16 +16,15 @@ mod counts;
 mod structures;
 mod figures;
 
-use std::path::PathBuf;
+use surfel_tests::bench_args::{is_timed, take_folder};
 
 fn main() {
-    // `cargo test` only checks that the program works.
-    if !std::env::args().any(|argument| argument == "--bench") {
+    if !is_timed() {
         kinds::check();
         return edges::check();
     }
     let mut args: Vec<String> = std::env::args().skip(1).collect();
-    let folder = take_folder(&mut args);
+    let folder = take_folder(&mut args, "--pictures");
     let words: Vec<String> = args.into_iter().filter(|word| !word.starts_with('-')).collect();
     let is_wanted = |part: &str| words.is_empty() || words.iter().any(|word| word == part);
     if is_wanted("table1") {
@@ -55,11 +54,4 @@ fn main() {
             None => eprintln!("figures skipped: no --pictures FOLDER"),
         }
     }
-}
-
-/// Removes the option `--pictures` from the arguments, and returns its folder.
-fn take_folder(args: &mut Vec<String>) -> Option<PathBuf> {
-    let at = args.iter().position(|word| word == "--pictures")?;
-    let mut taken = args.drain(at..=at + 1);
-    taken.nth(1).map(PathBuf::from)
 }

@@ -1,7 +1,7 @@
 //! The rules that turn normals before they are blended, at the edges of a cube whose normals have random signs.
 
 use surfel_core::flat::FlatCloud;
-use surfel_core::math::{Ray, Vec3, hash};
+use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{Align, EdgeTest, GatherLimit, SurfaceKind, SurfaceOptions};
@@ -14,12 +14,7 @@ const EYE: Vec3 = Vec3::new(4.0, -3.2, 2.6);
 const RADIUS: f32 = 1.5 * 2.0 / 58.0;
 
 fn cube() -> PointCloud {
-    let mut cloud = clouds::cube(58, 0.0, 1);
-    for (i, normal) in cloud.normals.iter_mut().flatten().enumerate() {
-        if hash(i as u64) & 1 == 1 {
-            *normal = -*normal;
-        }
-    }
+    let mut cloud = clouds::with_random_signs(clouds::cube(58, 0.0, 1));
     cloud.radii = Some(vec![RADIUS; cloud.len()]);
     cloud
 }

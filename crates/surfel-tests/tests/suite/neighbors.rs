@@ -22,16 +22,6 @@ fn flat_with(cloud: PointCloud, kind: SurfaceKind, options: SurfaceOptions) -> F
     FlatCloud::new(&points, &NoProgress).unwrap()
 }
 
-/// Returns a copy whose normals have random signs.
-fn unoriented(mut cloud: PointCloud) -> PointCloud {
-    for (i, normal) in cloud.normals.iter_mut().flatten().enumerate() {
-        if surfel_core::math::hash(i as u64) & 1 == 1 {
-            *normal = -*normal;
-        }
-    }
-    cloud
-}
-
 #[test]
 fn a_sphere_has_the_depth_and_normals_of_a_sphere() {
     // The radius of a point is 0.05. Greatest errors of depth in units and of angle in degrees, up to 45 degrees from the
@@ -44,7 +34,7 @@ fn a_sphere_has_the_depth_and_normals_of_a_sphere() {
         (SurfaceKind::Mls, 3, 0.1 * flat_error, 0.2),
     ] {
         let options = SurfaceOptions { degree, ..SurfaceOptions::default() };
-        let flat = flat_with(unoriented(clouds::sphere(20_000, 1.0)), kind, options);
+        let flat = flat_with(clouds::with_random_signs(clouds::sphere(20_000, 1.0)), kind, options);
         let rays = rays_from_above(0.7, 100);
         let inside = |ray: &&Ray| ray.origin.truncate().length() < 0.7;
         let rays: Vec<Ray> = rays.iter().filter(inside).copied().collect();
@@ -60,7 +50,7 @@ fn a_sphere_has_the_depth_and_normals_of_a_sphere() {
 #[test]
 fn a_plane_is_flat_and_ends_at_its_outermost_points() {
     for kind in KINDS {
-        let flat = scenes::flat(unoriented(clouds::plane(50, 0.3, 4)), kind);
+        let flat = scenes::flat(clouds::with_random_signs(clouds::plane(50, 0.3, 4)), kind);
         for hit in hits(&flat, &rays_from_above(0.95, 60)) {
             assert!((hit.distance - 5.0).abs() < 1e-4, "{kind:?} {hit:?}");
             assert!(0.99999 < hit.normal.z, "{kind:?} {hit:?}");
@@ -76,7 +66,7 @@ fn a_plane_is_flat_and_ends_at_its_outermost_points() {
 #[test]
 fn the_sides_of_a_cube_are_flat() {
     for kind in KINDS {
-        let flat = scenes::flat(unoriented(clouds::cube(40, 0.3, 2)), kind);
+        let flat = scenes::flat(clouds::with_random_signs(clouds::cube(40, 0.3, 2)), kind);
         // The radius of a point is 0.1.
         for hit in hits(&flat, &rays_from_above(0.8, 60)) {
             assert!((hit.distance - 4.0).abs() < 1e-3 && 0.999 < hit.normal.z, "{kind:?} {hit:?}");
@@ -90,7 +80,8 @@ fn the_sides_of_a_cube_are_flat() {
 #[test]
 fn crossing_planes_are_flat_beside_their_crossing() {
     for kind in KINDS {
-        let flat = scenes::flat(unoriented(clouds::crossing_planes(50, 0.3, 5)), kind);
+        let flat =
+            scenes::flat(clouds::with_random_signs(clouds::crossing_planes(50, 0.3, 5)), kind);
         for (ray, hit) in
             rays_from_above(0.95, 60).iter().zip(hits(&flat, &rays_from_above(0.95, 60)))
         {
@@ -131,7 +122,7 @@ fn moebius_strip() -> PointCloud {
 #[test]
 fn a_moebius_strip_has_no_seam() {
     for kind in KINDS.into_iter().chain(FIELD_KINDS) {
-        let flat = scenes::flat(unoriented(moebius_strip()), kind);
+        let flat = scenes::flat(clouds::with_random_signs(moebius_strip()), kind);
         for i in 0..2000 {
             let angle = std::f32::consts::TAU * i as f32 / 2000.0;
             let outward = Vec3::new(angle.cos(), angle.sin(), 0.0);

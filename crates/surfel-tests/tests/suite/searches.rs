@@ -60,7 +60,6 @@ fn the_lowest_slot_of_equal_points_is_hit() {
     };
     let mut points = scenes::grey(cloud);
     points.surface = SurfaceKind::Disc;
-    points.edge_test = EdgeTest::AngularGap;
     let flat = FlatCloud::new(&points, &surfel_core::progress::NoProgress).unwrap();
     let rays = [Ray::new(Vec3::new(5.0, 2.1, 3.0), -Vec3::X)];
     BruteForce::new(&flat, rays.to_vec()).check_in_order("equal points");

@@ -125,12 +125,7 @@ fn the_search_continues_behind_a_rejected_hit() {
 #[test]
 fn aligned_normals_are_exact_where_means_cancel() {
     // The signs of the normals are random: their mean is useless, the mean of aligned normals is exact.
-    let mut cloud = clouds::sphere(20_000, 1.0);
-    for (i, normal) in cloud.normals.as_mut().unwrap().iter_mut().enumerate() {
-        if surfel_core::math::hash(i as u64) & 1 == 1 {
-            *normal = -*normal;
-        }
-    }
+    let cloud = clouds::with_random_signs(clouds::sphere(20_000, 1.0));
     let mean_angle = |kind| {
         let scene = scenes::flat(cloud.clone(), kind);
         let rays = rays_from_above(0.5, 50);
