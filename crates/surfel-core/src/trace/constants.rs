@@ -2,12 +2,11 @@
 
 pub use crate::surface::MIN_SLIT_DEPTH;
 pub use crate::trace::query::edge_test::RETRY_RADIUS_FACTOR;
+pub use crate::trace::query::hit::{MAX_REJECTED_HITS, RESTART_OFFSET};
 pub use crate::trace::query::smooth_hits::{MIN_SLIT_COSINE, SMOOTH_RESTART_OFFSET};
 pub use crate::trace::query::smooth_query::{
     MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, TOLERANCE,
 };
-pub use crate::trace::query::splat_query::RESTART_OFFSET;
-pub use crate::trace::query::surface_hit::MAX_REJECTED_HITS;
 pub use crate::trace::simd::node_boxes::ROUNDING;
 
 /// Constants of the surface of moving least squares.
@@ -21,7 +20,7 @@ pub mod mls {
 
 /// Constants of the field of weighted planes.
 pub mod field {
-    pub use crate::trace::query::field_query::{MAX_REJECTED_HITS, OVERLAP, RESTART_OFFSET};
+    pub use crate::trace::query::field_query::OVERLAP;
     pub use crate::trace::query::ray_field::{
         BRACKET_MARGIN, LINEAR_STEP, MIN_COLOR_WEIGHT, N_SAMPLES,
     };

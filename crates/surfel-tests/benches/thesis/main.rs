@@ -1,9 +1,10 @@
 //! The tables and figures of C. Wiesmeier, Ray Tracing Point Clouds (2011), repeated: the figures of docs/thesis.md.
 //!
 //! `cargo bench -p surfel-tests --bench thesis -- WORDS`: the words `table1`, `table2`, `kinds`, `further`, `counts`,
-//! `structures`, `edges` and `figures` select parts, without any all are made. `counts`, and the columns of the kd-tree in
-//! `structures`, need `--features counts`, which slows the others. The standard output has the tables as the document shows
-//! them, the standard error what is skipped. `--pictures FOLDER` writes the figures and a picture of each kind.
+//! `structures`, `edges` and `figures` select parts, without any all are made. With `--features counts`, which slows the
+//! others, `counts` prints evaluations instead of times, and `structures` has the columns of the kd-tree. The standard
+//! output has the tables as the document shows them, the standard error what is skipped. `--pictures FOLDER` writes the
+//! figures and a picture of each kind.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a benchmark prints its tables")]
 
 mod clouds;

@@ -4,17 +4,12 @@ use crate::flat::FlatCloud;
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, set_bits};
 use crate::surface::{CandidateHit, EdgeTest};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes};
-use crate::trace::query::hit::Hit;
+use crate::trace::query::hit::{Hit, MAX_REJECTED_HITS, RESTART_OFFSET};
 use crate::trace::query::packet_field::{PacketField, PacketZeros};
 use crate::trace::query::ray_field::{FieldHit, RayField, RaySegment};
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::kd_walk::{KdWalk, LeafInterval};
 use std::marker::PhantomData;
-
-/// Maximum number of hits of a ray that the edge test rejects. A ray with more is taken to miss.
-pub const MAX_REJECTED_HITS: usize = 48;
-/// Distance behind a rejected hit at which the search restarts, in radii.
-pub const RESTART_OFFSET: f32 = 0.05;
 
 /// Widening of a ray's interval in a leaf, in distances: neighbouring leaves find the zeros between them.
 pub const OVERLAP: f32 = 4.0 * f32::EPSILON;

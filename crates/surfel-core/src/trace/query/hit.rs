@@ -4,6 +4,12 @@ use crate::flat::Slot;
 use crate::math::Floats;
 use crate::surface::MAX_GATHERED;
 
+/// Maximum number of rejected hits of a ray. A ray with more runs along a rim, where each step is tiny, and
+/// is taken to miss.
+pub const MAX_REJECTED_HITS: usize = 48;
+/// Distance behind a rejected hit at which the search restarts, in radii.
+pub const RESTART_OFFSET: f32 = 0.05;
+
 /// The nearest shape on a ray. Of two equally near shapes it is the one in the lower slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {

@@ -5,10 +5,10 @@ use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
 use crate::surface::{CandidateHit, EdgeTest, EdgeTestResult, MIN_SLIT_DEPTH, Surfel};
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_test::evaluate_one;
-use crate::trace::query::hit::Hit;
+use crate::trace::query::hit::{Hit, MAX_REJECTED_HITS};
 use crate::trace::query::searching_rays::{CandidatePacket, SearchingRays};
 use crate::trace::query::smooth_query::SmoothTracer;
-use crate::trace::query::surface_hit::{MAX_REJECTED_HITS, SurfaceHit};
+use crate::trace::query::surface_hit::SurfaceHit;
 use crate::trace::simd::packet_rays::PacketRays;
 
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.

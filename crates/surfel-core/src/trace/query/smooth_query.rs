@@ -162,12 +162,12 @@ fn approach<W: PacketLanes>(
         let lanes = lane_mask::<W>(open);
         let mut sums = SphereSums::new(hits.normals, radius);
         for block in blocks {
-            count(Counted::Terms, PACKET_WIDTH * block.lanes.count_ones() as usize);
             let corner = block.corner_from(&position);
             for lane in set_bits::<LANES>(block.lanes) {
                 let point = block.point(&corner, lane);
                 let near = lanes & sums.is_near(&point);
                 if near.bits() != 0 {
+                    count(Counted::Terms, PACKET_WIDTH);
                     sums.add(&point, near);
                 }
             }

@@ -12,7 +12,7 @@ use crate::surface::{
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_by_blocks, enclosed_lanes};
 use crate::trace::query::gather::{DiscConsumer, GatherQuery, PacketDiscs};
-use crate::trace::query::hit::Hit;
+use crate::trace::query::hit::{Hit, RESTART_OFFSET};
 use crate::trace::query::packet_disc_hits::PacketDiscHit;
 use crate::trace::query::plane_fit::{FittedDiscs, FittedPlanes};
 use crate::trace::simd::packet_rays::PacketRays;
@@ -22,9 +22,6 @@ use crate::trace::traversal::group::GROUP_SIZE;
 use crate::trace::traversal::interleaved::RayPool;
 use crate::trace::traversal::stack::PacketStack;
 use std::marker::PhantomData;
-
-/// Distance behind a rejected hit at which the search restarts, in radii.
-pub const RESTART_OFFSET: f32 = 0.05;
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]

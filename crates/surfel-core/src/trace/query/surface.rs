@@ -8,7 +8,7 @@ use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::field_query::field_hits;
 use crate::trace::query::gaussian_hits::{gaussian_hits, gaussian_occlusions};
-use crate::trace::query::hit::Hit;
+use crate::trace::query::hit::{Hit, MAX_REJECTED_HITS};
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::mls_surface::{MlsHit, mls_hits};
 use crate::trace::query::octree_query::{CellHit, cell_color, octree_hits};
@@ -17,7 +17,7 @@ use crate::trace::query::smooth_filter::SmoothFilter;
 use crate::trace::query::smooth_hits::trace_smooth;
 use crate::trace::query::splat_query::{Splat, SplatTracer};
 use crate::trace::query::support::support;
-use crate::trace::query::surface_hit::{MAX_REJECTED_HITS, SurfaceHit};
+use crate::trace::query::surface_hit::SurfaceHit;
 use crate::trace::simd::{Simd, dispatch_simd};
 use crate::trace::traversal::octree_walk::PixelSize;
 

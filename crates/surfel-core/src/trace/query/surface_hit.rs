@@ -43,7 +43,3 @@ impl SurfaceHit {
         self.id == u32::MAX
     }
 }
-
-/// Maximum number of rejected hits of a ray. A ray with more runs along a rim, where each step is tiny, and
-/// is taken to miss.
-pub const MAX_REJECTED_HITS: usize = 48;

@@ -2,7 +2,7 @@
 
 fn surface_hit(whole_ray: Ray) -> SurfaceHit {
     var ray = whole_ray;
-    for (var n_rejected = 0u; n_rejected < FIELD_MAX_REJECTED_HITS; n_rejected++) {
+    for (var n_rejected = 0u; n_rejected < MAX_REJECTED_HITS; n_rejected++) {
         let found = first_field_hit(ray);
         if !found.is_hit {
             break;
@@ -21,7 +21,7 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
             let color = field_color(found);
             return point_hit(found.distance, found.slot, point.radius, normal, color, is_backface);
         }
-        let behind = found.distance + FIELD_RESTART_OFFSET * point.radius;
+        let behind = found.distance + RESTART_OFFSET * point.radius;
         ray.t_min = max(behind, found.distance * (1.0 + 2.0 * EPSILON));
     }
     return missed_surface();
