@@ -66,7 +66,10 @@ async function operate(page) {
   record('ran');
   const element = await step('the frame of the viewer is there', page.locator('iframe[title="surfel viewer"]').elementHandle());
   const frame = await step('the frame has a page', element.contentFrame());
-  await step('the picture is finished', frame.waitForFunction(() => window.surfel?.state?.lastFrame?.finished, undefined, BY_CLOCK));
+  await step('the picture is finished', frame.waitForFunction(() => {
+    const { synced, lastFrame } = window.surfel?.state ?? {};
+    return synced && lastFrame?.finished && document.getElementById('work-bar').hidden;
+  }, undefined, BY_CLOCK));
   const found = await step('the picture is read', frame.evaluate(() => {
     const picture = document.getElementById('picture');
     const copy = new OffscreenCanvas(picture.width, picture.height).getContext('2d');

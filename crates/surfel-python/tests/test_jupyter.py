@@ -108,9 +108,13 @@ def start(words, environment, log):
 def start_lab(folder, log):
     """Starts a JupyterLab of a folder; returns its process and address."""
     port = free_port()
+    # JupyterLab would ask over the notebook whether it may show news.
+    page_config = folder / "jupyter-config" / "labconfig" / "page_config.json"
+    page_config.parent.mkdir(parents=True)
+    page_config.write_text('{"disabledExtensions": {"@jupyterlab/apputils-extension:announcements": true}}')
     own = {f"JUPYTER_{name}_DIR": str(folder / f"jupyter-{name.lower()}") for name in ("CONFIG", "DATA", "RUNTIME")}
     words = ["--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}", f"--IdentityProvider.token={TOKEN}"]
-    words += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url=", f"--ServerApp.root_dir={folder}"]
+    words += ["--LabApp.expose_app_in_browser=True", f"--ServerApp.root_dir={folder / 'scans'}"]
     lab = start([sys.executable, "-m", "jupyterlab", *words], os.environ | own, log)
     address = f"http://127.0.0.1:{port}"
     end = time.monotonic() + 120
@@ -128,11 +132,16 @@ def test_the_page_is_in_a_cell_of_jupyterlab(hill, tmp_path):
     for package in ("jupyterlab", "anywidget", "nbformat", "ipykernel"):
         pytest.importorskip(package)
     environment = browser_environment()
-    code = [f"import surfel\nviewer = surfel.view(surfel.load({str(hill)!r}, light_samples=1, spp=1))\nviewer"]
+    # With the program's demo.laz as SURFEL_SCAN the screenshot is that of docs/python.md.
+    scan = pathlib.Path(os.environ.get("SURFEL_SCAN", hill))
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    shutil.copy(scan, folder)
+    code = [f"import surfel\n\nscene = surfel.load({scan.name!r})\nsurfel.view(scene)"]
     cells = [{"cell_type": "code", "id": "a", "metadata": {}, "execution_count": None, "outputs": [], "source": code}]
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
     notebook = {"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}
-    (tmp_path / "viewer.ipynb").write_text(json.dumps(notebook))
+    (folder / "viewer.ipynb").write_text(json.dumps(notebook))
     screenshot = pathlib.Path(os.environ.get("SURFEL_SCREENSHOTS", tmp_path)) / "jupyterlab.png"
     with open(tmp_path / "lab.log", "w") as lab_log, open(tmp_path / "page.log", "w+") as page_log:
         lab, address = start_lab(tmp_path, lab_log)
