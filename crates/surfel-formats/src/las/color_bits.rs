@@ -67,8 +67,8 @@ mod tests {
     fn scaled(batches: &[&[u16]]) -> (Vec<u16>, ColorBits) {
         let (mut colors, mut bits) = (Vec::new(), ColorBits::default());
         for batch in batches {
-            let mut cloud = PointCloud::default();
-            cloud.colors = Some(batch.iter().map(|v| [*v, 0, 0]).collect());
+            let new = batch.iter().map(|v| [*v, 0, 0]).collect();
+            let mut cloud = PointCloud { colors: Some(new), ..PointCloud::default() };
             bits.scale(
                 ColumnSlices { colors: Some(&mut colors), ..Default::default() },
                 &mut cloud,

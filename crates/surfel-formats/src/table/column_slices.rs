@@ -90,7 +90,7 @@ impl<'a> ColumnSlices<'a> {
 
     /// Copies ranges of points to the first points of these slices, one after the other.
     pub fn copy_ranges(&mut self, from: &ColumnSlices, ranges: &[Range<usize>]) {
-        copy(&mut self.positions, &from.positions, ranges);
+        copy(self.positions, from.positions, ranges);
         copy_if_present(&mut self.normals, &from.normals, ranges);
         copy_if_present(&mut self.radii, &from.radii, ranges);
         copy_if_present(&mut self.colors, &from.colors, ranges);

@@ -108,7 +108,7 @@ mod tests {
     fn ranges_hold_the_set_flags_and_do_not_touch() {
         for n in [0, 1, 15, 16, 17, 100, 1000] {
             for one_of in [1, 2, 3, 100] {
-                let flags: Vec<bool> = (0..n).map(|i| hash(i) % one_of != 0).collect();
+                let flags: Vec<bool> = (0..n).map(|i| !hash(i).is_multiple_of(one_of)).collect();
                 for flags in [flags.clone(), flags.iter().map(|flag| !flag).collect()] {
                     let found = ranges(&flags);
                     assert!(found.windows(2).all(|pair| pair[0].end < pair[1].start));

@@ -82,7 +82,8 @@ mod tests {
         for n in [0, 1, 63, 64, 65, 127, 128, 1000] {
             for one_of in [1, 2, 3, 100, u64::MAX] {
                 let start = n % 7;
-                let keep: Vec<bool> = (0..n).map(|i| hash(i as u64) % one_of != 0).collect();
+                let keep: Vec<bool> =
+                    (0..n).map(|i| !hash(i as u64).is_multiple_of(one_of)).collect();
                 for keep in [keep.clone(), keep.iter().map(|flag| !flag).collect()] {
                     let column: Vec<usize> = (0..start + n).collect();
                     let is_kept = |i: &usize| *i < start || keep[*i - start];
