@@ -31,12 +31,13 @@ impl<'a> FilteredCloud<'a> {
         n_points: usize,
         filter: &'a PointFilter,
     ) -> Self {
-        let batch = empty.clone();
-        let mut cloud = empty;
+        let mut cloud = empty.clone();
         // Zeros take up memory only once they are written to. If the system has no room even so, the cloud grows with
         // each batch.
-        resize(&mut cloud, n_points);
-        Self { input, filter, cloud, n_kept: 0, batch }
+        if !resize(&mut cloud, n_points) {
+            cloud = empty.clone();
+        }
+        Self { input, filter, cloud, n_kept: 0, batch: empty }
     }
 
     /// Appends the kept points of a batch. `read` gets the points that were kept before, and writes the batch over
@@ -99,10 +100,34 @@ fn ranges(flags: &[bool]) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    //! Ranges of flags.
+    //! Points that are kept, and ranges of flags.
 
     use super::*;
-    use surfel_core::math::hash;
+    use surfel_core::math::{Vec3, hash};
+
+    #[test]
+    fn batches_of_any_size_are_filtered_also_without_room_for_all_points() {
+        let input = Input::from_bytes("a.las", &[]);
+        let filter: PointFilter = "intensity > 2".parse().unwrap();
+        let empty = PointCloud { intensity: Some(Vec::new()), ..PointCloud::default() };
+        for n_at_most in [30, usize::MAX / 4] {
+            let mut filtered = FilteredCloud::new(&input, empty.clone(), n_at_most, &filter);
+            for n in [7, 3, 20] {
+                let read = |before: ColumnSlices, cloud: &mut PointCloud| {
+                    assert!(before.intensity.unwrap().iter().all(|value| 2.0 < *value));
+                    cloud.positions = (0..n).map(|i| Vec3::splat(i as f32)).collect();
+                    cloud.intensity = Some((0..n).map(|i| i as f32).collect());
+                    Ok(())
+                };
+                filtered.append(read).unwrap();
+            }
+            let cloud = filtered.finish();
+            let expected: Vec<f32> = (3..7).chain(3..20).map(|i| i as f32).collect();
+            assert_eq!(cloud.intensity, Some(expected.clone()));
+            let positions: Vec<Vec3> = expected.into_iter().map(Vec3::splat).collect();
+            assert_eq!(cloud.positions, positions);
+        }
+    }
 
     #[test]
     fn ranges_hold_the_set_flags_and_do_not_touch() {
