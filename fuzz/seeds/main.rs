@@ -1,4 +1,8 @@
-//! Writes the initial corpus of the fuzzer: small valid files in the folder `corpus` next to this file.
+//! Writes the initial corpus of the fuzzer: small valid files in the folder `corpus` of this package.
+
+mod gltf;
+mod scene;
+mod viewer;
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +12,7 @@ use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Scalar, Values};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{ImageOptions, SaveOptions, encode_png, save, save_image};
+use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
@@ -81,9 +85,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     fs::write(corpus.join("bin/three.bin"), [&record[..], &non_finite, &record].concat())?;
     write_conditions(&corpus)?;
     write_scans(&corpus)?;
-    write_gltf(&corpus.join("gltf"))?;
-    write_scenes(&corpus.join("scene"))?;
-    write_viewer_input(&corpus.join("viewer"))?;
+    gltf::write(&corpus.join("gltf"))?;
+    scene::write(&corpus.join("scene"))?;
+    viewer::write(&corpus.join("viewer"))?;
     write_environment_maps(&corpus.join("environment"))
 }
 
@@ -271,214 +275,6 @@ fn write_meshes(corpus: &Path) -> std::io::Result<()> {
         Pr 0.5\nPm 1\nmap_Kd -s 2 3 1 -o 0.5 -clamp on -mm 0 1 a.png\nmap_Ke b.png\nnorm -bm 2 c.png\n";
     fs::write(corpus.join("mtl/all.mtl"), mtl)?;
     fs::write(corpus.join("mtl/mirror.mtl"), "newmtl m\nKs 1 1 0.5\nillum 3\n")
-}
-
-/// Writes a scene with all supported features, as GLB and as JSON.
-fn write_gltf(folder: &Path) -> std::io::Result<()> {
-    let png = encode_png(&Image::new(2, 2), &ImageOptions::default());
-    let png = png.map_err(std::io::Error::other)?;
-    let floats = |floats: &[f32]| -> Vec<u8> {
-        floats.iter().flat_map(|value| value.to_le_bytes()).collect()
-    };
-    let square = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
-    let identity = floats(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]);
-    let times = floats(&[0.0, 1.0]);
-    let bytes = [0, 1, 2, 0, 2, 3, 0, 0, 127, 0, 0, 127, 255, 0, 0, 127];
-    let buffer = [&square[..], &identity, &times, &bytes, &png].concat();
-    let view = |offset: usize, length: usize| {
-        format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
-    };
-    let views = [view(0, 48), view(48, 64), view(112, 8), view(120, 16), view(136, png.len())];
-    let accessor = |view: usize, offset: usize, component: usize, kind: &str, count: usize| {
-        format!(
-            r#"{{"bufferView":{view},"byteOffset":{offset},"componentType":{component},"type":"{kind}","count":{count}}}"#
-        )
-    };
-    let accessors = [
-        accessor(0, 0, 5126, "VEC3", 4),
-        accessor(3, 0, 5121, "SCALAR", 6),
-        accessor(0, 0, 5126, "VEC2", 4),
-        accessor(3, 0, 5121, "VEC4", 4),
-        accessor(1, 0, 5126, "MAT4", 1),
-        accessor(2, 0, 5126, "SCALAR", 2),
-        accessor(0, 0, 5126, "VEC3", 2),
-        accessor(1, 0, 5126, "VEC4", 2),
-        accessor(3, 0, 5120, "VEC3", 4),
-        r#"{"componentType":5126,"type":"VEC3","count":4,"sparse":{"count":1,"indices":{"bufferView":3,"byteOffset":1,"componentType":5121},"values":{"bufferView":0,"byteOffset":12}}}"#.into(),
-    ];
-    let rest = r#""scene":0,"scenes":[{"nodes":[0,1,3]}],
-"nodes":[{"mesh":0,"skin":0,"weights":[0.5]},{"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1],"children":[2],"camera":0},
-{"translation":[1,2,3],"rotation":[0,0,0,1],"scale":[1,2,1],"extensions":{"KHR_lights_punctual":{"light":0}}},
-{"mesh":1,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":6}}}}],
-"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":8,"TEXCOORD_0":2,"COLOR_0":3,"JOINTS_0":3,"WEIGHTS_0":3,"TANGENT":3},"indices":1,"material":0,"mode":5,"targets":[{"POSITION":9}]}]},
-{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":3},"mode":0},{"attributes":{"POSITION":0},"indices":1,"mode":6}]}],
-"skins":[{"joints":[2],"inverseBindMatrices":4}],
-"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"alphaMode":"MASK","extensions":{"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_ior":{"ior":1.4}}}],
-"textures":[{"source":0,"sampler":0}],"samplers":[{"wrapS":33071}],"images":[{"bufferView":4}],
-"cameras":[{"type":"perspective","perspective":{"yfov":1}}],
-"extensions":{"KHR_lights_punctual":{"lights":[{"type":"spot","spot":{"outerConeAngle":0.5}}]}},
-"animations":[{"samplers":[{"input":5,"output":6},{"input":5,"output":7,"interpolation":"STEP"},{"input":5,"output":5}],
-"channels":[{"sampler":0,"target":{"node":1,"path":"translation"}},{"sampler":1,"target":{"node":2,"path":"rotation"}},{"sampler":2,"target":{"node":0,"path":"weights"}}]}]"#;
-    let json = |buffer: &str| {
-        let (accessors, views) = (accessors.join(","), views.join(","));
-        let start = format!(
-            r#"{{"asset":{{"version":"2.0"}},"buffers":[{buffer}],"bufferViews":[{views}],"accessors":[{accessors}],"#
-        );
-        // The skin has only joint 0, so the joints come from a separate accessor of zeros.
-        (start + rest + "}").replace(r#""JOINTS_0":3"#, r#""JOINTS_0":10"#).replace(
-            r#"],"scene":0"#,
-            r#",{"componentType":5121,"type":"VEC4","count":4}],"scene":0"#,
-        )
-    };
-    let escaped: String = buffer.iter().map(|byte| format!("%{byte:02x}")).collect();
-    let length = buffer.len();
-    let data = format!(r#"{{"byteLength":{length},"uri":"data:,{escaped}"}}"#);
-    fs::write(folder.join("scene.gltf"), json(&data))?;
-    let mut json = json(&format!(r#"{{"byteLength":{length}}}"#)).into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let word = |n: usize| (n as u32).to_le_bytes();
-    let header =
-        [&b"glTF"[..], &word(2), &word(28 + json.len() + length), &word(json.len()), b"JSON"];
-    let glb = [&header.concat()[..], &json, &word(length), b"BIN\0", &buffer].concat();
-    surfel_formats::load_gltf_bytes("scene.glb", &glb, &NoProgress)
-        .map_err(std::io::Error::other)?;
-    fs::write(folder.join("scene.glb"), glb)
-}
-
-/// Writes a scene with all features as TOML and as JSON, after a byte that selects the format.
-fn write_scenes(folder: &Path) -> std::io::Result<()> {
-    let toml = r##"# A scene
-resolution = [64, 48]
-spp = 2
-light = ["sun", "sky"]
-background = "#102030,#fff"
-camera_panorama = false
-[camera]
-position = [1, -2.5, 3e0]
-focal_point = [0, 0, 0]
-[sun]
-elevation = 30
-[[object]]
-name = "a"
-file = "a.ply"
-surface = "disc"
-radius = "median:6"
-translate = [1, 2, 3]
-rotate = [0, 0, 90]
-scale = 2
-visible = true
-material = { kind = "glass", ior = 1.3, attenuation_color = "#88ccff", thin = true }
-instances = [{ translate = [5, 0, 0] }, { rotate = { axis = [0, 0, 1], angle = 30 }, scale = [1, 2, 3] }]
-[[object]]
-files = ["b.obj", "c.glb"]
-fps = 5
-parent = "a"
-material = "mirror"
-matrix = [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1]
-[[lamp]]
-name = "l"
-kind = "spot"
-position = [0, 0, 4]
-target = [1, 1, 0]
-color = "#ffcc88"
-strength = 10
-radius = 0.1
-range = 50
-angle = 60
-blend = 0.2
-[[animation]]
-object = "a"
-times = [0, 1.5, 3]
-interpolation = "cubic"
-translate = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
-rotate = [[0, 0, 0], { axis = [1, 1, 0], angle = 40 }, [0, 0, 90]]
-scale = [1, [1, 2, 1], 0]
-visible = [true, false, true]
-[[animation]]
-object = "b"
-kind = "orbit"
-seconds = 8
-turns = -2
-axis = [0, 1, 0]
-center = [1, 0, 0]
-[[animation]]
-object = "l"
-kind = "path"
-points = [[0, 0, 4], [1, 0, 4], [1, 0, 4]]
-seconds = 2
-[[animation]]
-object = "camera"
-times = [0, 1]
-interpolation = "ease"
-position = [[1, 1, 1], [2, 2, 2]]
-focal_point = [[0, 0, 0], [0, 0, 1]]
-[[animation]]
-object = "camera"
-kind = "orbit"
-seconds = 4
-"##;
-    let json = r##"{"spp": 2, "output": null, "camera": {"position": [1, 2, 3], "view-angle": 40.5},
-"object": [{"file": "a.ply", "instances": {"scale": 0.5}, "material": {"color": "#fff", "alpha": "0.5"}}],
-"lamp": [{"position": [0, 0, 1], "kind": "directional"}],
-"animation": {"object": "a", "kind": "keys", "times": [0, 1], "interpolation": "step", "rotate": [[0, 0, 0], [0, 0, 9]]},
-"info": {"points": 7}}"##;
-    fs::write(folder.join("all.toml"), format!("\n{toml}"))?;
-    fs::write(folder.join("all.json"), format!("\t{json}"))?;
-    for (i, table) in toml.split("\n[[").enumerate().skip(1) {
-        fs::write(folder.join(format!("{i}.toml")), format!("\n[[{table}"))?;
-    }
-    Ok(())
-}
-
-/// Writes HTTP requests and page messages, after a byte that selects the kind.
-fn write_viewer_input(folder: &Path) -> std::io::Result<()> {
-    let camera =
-        r#"{"position":[9,-2,3],"focal_point":[2,1,-1],"view_up":[0,0,1],"view_angle":40}"#;
-    let pages = [
-        r#"{"type":"camera","seq":1,"camera":CAMERA,"moving":true}
-{"type":"ack","frame":1}
-{"type":"camera","seq":2,"camera":CAMERA}
-{"type":"pick","id":1,"x":20.5,"y":15}
-{"type":"profile","id":2,"points":[[0,0,0],[4,2,1]],"width":0.5,"up":[0,0,1]}
-{"type":"volume","id":4,"points":[[0,0,0],[4,2,1],[0,3,0]],"up":[0,0,1],"base":"mean","cell_size":0.5}
-{"type":"histogram","id":5,"column":"z"}
-{"type":"points","id":6,"format":"laz"}"#,
-        r##"{"type":"set","seq":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"adaptive:6"}}
-{"type":"set","seq":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
-{"type":"set","seq":3,"scene":{"material":"full.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
-{"type":"set","seq":4,"scene":{"surface":null,"material":null,"clip_box":null,"time":0.5,"subsample":"random:5","spp":2}}"##,
-        r#"{"type":"size","width":64,"height":32}
-{"type":"save","id":1,"width":30,"height":20}
-{"type":"cancel","id":1}
-{"type":"export","id":2,"width":30,"height":20}
-{"type":"loadScene","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"full.ply\""}
-{"type":"loadScene","id":4,"name":"a.json","text":"{\"surface\": \"sphere\", \"object\": []}"}"#,
-        r#"{"type":"set","seq":1,"scene":{"camera":{"orthographic":9,"view_angle":null},"up":[0,1,0],"edge_test":"off"}}
-{"type":"set","seq":2,"scene":{"camera":{"panorama":true,"orthographic":null},"environment":"/etc/passwd"}}
-{"type":"hello","width":3,"height":2}"#,
-        r#"{"type":"ping"}
-{"type":"visible","id":1,"points":[[0,0,0],[4,2,1]]}
-{"type":"movie","id":2,"format":"gif","width":16,"height":12,"fps":5}
-{"type":"addFile","id":3,"name":"b.xyz","n_bytes":12}
-{"type":"cancel","id":2}"#,
-    ];
-    for (i, page) in pages.iter().enumerate() {
-        let page = page.replace("CAMERA", camera);
-        fs::write(folder.join(format!("page-{i}")), format!("\t{page}"))?;
-    }
-    let body = r#"{"camera":{"direction":[0,0,-1],"orthographic":true},"resolution":[20,10]}"#;
-    let requests = [
-        "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n".to_owned(),
-        "GET /scene HTTP/1.1\r\nHost: 127.0.0.1:80\r\n\r\nGET /stats HTTP/1.0\r\nHost: localhost\r\n\r\n".into(),
-        "GET /render?resolution=20x10&camera-azimuth-angle=30&light=sky HTTP/1.1\r\nHost: [::1]\r\nOrigin: http://[::1]\r\n\r\n".into(),
-        format!("POST /render HTTP/1.1\r\nHost: localhost\r\nContent-Length: {}\r\n\r\n{body}", body.len()),
-        format!("POST /render HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n{:x}\r\n{body}\r\n0\r\n\r\n", body.len()),
-        "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n\u{1}\u{3}abc".into(),
-    ];
-    for (i, request) in requests.iter().enumerate() {
-        fs::write(folder.join(format!("request-{i}")), format!("\n{request}"))?;
-    }
-    Ok(())
 }
 
 /// Returns a cloud with positions only.
