@@ -15,7 +15,6 @@ use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
 use crate::points::normals::jets::fit_wide_jet;
 use crate::points::normals::planes::fit_plane;
 use crate::points::structure::wall_faces::{Face, N_FACE_NEIGHBORS};
-use crate::points::up::is_mostly_land;
 use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
@@ -118,8 +117,8 @@ pub fn denoise(
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
     let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
     let tree = KdTree::new(&sorted, progress)?;
-    let (is_land, states_normals) = (is_mostly_land(positions), cloud.normals.is_some());
-    let plants = Plants::find(&tree, noise.quantile(0.25), is_land, states_normals, progress)?;
+    let ground_noise = noise.quantile(0.25);
+    let plants = Plants::find(&tree, &groups, &noises, ground_noise, cloud, progress)?;
     let count = |(point, noise): (usize, &Option<f32>)| {
         progress.check()?;
         let Some(noise) = *noise else { return Ok(0) };

@@ -179,6 +179,30 @@ impl RegionNoise {
     }
 }
 
+/// Returns as many neighbours of a position as a noise in spacings asks for, as [`nearest`] does.
+pub fn neighbors_by_noise(
+    points: &KdTree,
+    groups: &KdTree,
+    position: Vec3,
+    noise: f32,
+) -> Option<(Vec<Neighbor>, usize)> {
+    let k = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
+    nearest(points, groups, position, k.clamp(MIN_NOISE_NEIGHBORS, MAX_NOISE_NEIGHBORS))
+}
+
+/// Returns the `k` nearest points to a position, or the groups that stand for them if they are many, and the number of points
+/// that each stands for; `None` if there are fewer.
+fn nearest(
+    points: &KdTree,
+    groups: &KdTree,
+    position: Vec3,
+    k: usize,
+) -> Option<(Vec<Neighbor>, usize)> {
+    let (tree, size) = if MAX_UNGROUPED < k { (groups, GROUP_SIZE) } else { (points, 1) };
+    let neighbors = tree.nearest(position, k / size, None);
+    (neighbors.len() == k / size).then_some((neighbors, size))
+}
+
 /// Returns the distance from a point to the last of [`MIN_NOISE_NEIGHBORS`].
 fn reach_at(tree: &KdTree, point: u32) -> f32 {
     let neighbors =
@@ -303,14 +327,13 @@ impl NoiseAtPoint {
         let (mut last_variation, mut has_fallen, mut has_risen) = (f32::INFINITY, false, false);
         let mut k = MIN_NOISE_NEIGHBORS;
         while k <= MAX_NOISE_NEIGHBORS {
-            let (tree, n_nearest) = match MAX_UNGROUPED < k {
-                true => (groups, k / GROUP_SIZE),
-                false => (points, k),
+            let Some((neighbors, size)) = nearest(points, groups, center, k) else {
+                return Self::Bent;
             };
-            let neighbors = tree.nearest(center, n_nearest, None);
+            let positions = if size == 1 { points.positions() } else { groups.positions() };
             let [nearest, others @ ..] = &neighbors[..] else { return Self::Bent };
-            let fit = fit_plane(tree.positions(), nearest.index as usize, others);
-            if neighbors.len() < n_nearest || fit.normal == Vec3::ZERO {
+            let fit = fit_plane(positions, nearest.index as usize, others);
+            if fit.normal == Vec3::ZERO {
                 return Self::Bent;
             }
             let variation = fit.variation;

@@ -1,13 +1,17 @@
 //! Plants: their points look like noise of a surface, but are none, and stay where they are.
 
+use super::noise::neighbors_by_noise;
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::neighbors::KdTree;
-use crate::points::normals::planes::fit_plane;
+use crate::points::PointCloud;
+use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::points::structure::above_land::is_above_land;
+use crate::points::up::is_mostly_land;
 use crate::progress::Progress;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// Number of neighbours that tell whether a point is rough.
 const N_ROUGH_NEIGHBORS: usize = 16;
@@ -23,7 +27,23 @@ const N_NEIGHBORS: usize = 24;
 /// Fraction of the neighbours that are rough in a crown: at edges and corners fewer are.
 const MIN_ROUGH_FRACTION: f32 = 0.75;
 /// Minimum fraction of the points in crowns: fewer are on ears, claws and other small parts of a surface.
-const MIN_IN_CROWNS: f32 = 0.01;
+const MIN_IN_CROWNS: f32 = 0.05;
+/// The same on land.
+const MIN_IN_CROWNS_ON_LAND: f32 = 0.01;
+/// Number of rough points near each other that are in a crown together, or in the noise of a surface.
+const RUN_SIZE: usize = 128;
+/// Number of these that vote.
+const N_VOTERS: usize = 3;
+/// Noise of a surface, in that of its region, that is tried in turn.
+const NOISE_RATIOS: [f32; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
+/// Greatest surface variation of noise among as many neighbours as it asks for.
+const MAX_NOISE_VARIATION: f32 = 0.08;
+/// Minimum number of rough points whose heights tell noise.
+const MIN_HEIGHTS: usize = 8;
+/// Minimum fraction of them on either side of the plane of the neighbours: a crown is above the ground.
+const MIN_ON_SIDE: f32 = 0.15;
+/// Greatest vertical component of the normal of a noisy surface on land, where crowns side by side are as level as the ground.
+const MAX_LEVEL: f32 = 0.7;
 /// Heights above land by noise alone, in multiples of it: planes through few noisy points err as much as the points do.
 const SLACK: f32 = 2.0;
 
@@ -38,20 +58,23 @@ pub struct Plants<'a> {
 }
 
 impl<'a> Plants<'a> {
-    /// Finds the crowns among the points of `tree`. `noise` is that of the ground in spacings. There may be low plants if the
-    /// cloud is land, and crowns if it states no normals, which only surfaces have.
+    /// Finds the crowns among the points of `tree`, near each other in memory. `groups` are the means of groups of them,
+    /// `noises` the noise at each point in spacings where it is known, and `noise` that of the ground. There may be low
+    /// plants if `cloud`, whose points they are, is land, and crowns if it states no normals, which only surfaces have.
     ///
     /// # Errors
     ///
     /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
     pub fn find(
         tree: &'a KdTree<'a>,
+        groups: &KdTree,
+        noises: &[Option<f32>],
         noise: f32,
-        is_land: bool,
-        states_normals: bool,
+        cloud: &PointCloud,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        if states_normals {
+        let is_land = is_mostly_land(&cloud.positions);
+        if cloud.normals.is_some() {
             return Ok(Self { tree, noise, is_land, in_crown: Vec::new() });
         }
         let positions = tree.positions();
@@ -69,8 +92,10 @@ impl<'a> Plants<'a> {
         };
         let mut in_crown =
             (0..positions.len()).into_par_iter().map(in_crown).collect::<Result<Vec<bool>>>()?;
+        remove_noise(tree, groups, noises, is_land, &mut in_crown, progress)?;
         let n_in_crowns = in_crown.iter().filter(|in_crown| **in_crown).count();
-        if (n_in_crowns as f32) < MIN_IN_CROWNS * positions.len() as f32 {
+        let min_fraction = if is_land { MIN_IN_CROWNS_ON_LAND } else { MIN_IN_CROWNS };
+        if (n_in_crowns as f32) < min_fraction * positions.len() as f32 {
             in_crown.clear();
         }
         Ok(Self { tree, noise, is_land, in_crown })
@@ -104,9 +129,79 @@ fn rough_points(tree: &KdTree, noise: f32, progress: &dyn Progress) -> Result<Ve
     positions.par_iter().enumerate().map(is_rough).collect()
 }
 
+/// Removes those points from crowns whose noise explains that their neighbours fill space.
+fn remove_noise(
+    tree: &KdTree,
+    groups: &KdTree,
+    noises: &[Option<f32>],
+    is_land: bool,
+    in_crown: &mut [bool],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let points: Vec<usize> = (0..in_crown.len()).filter(|point| in_crown[*point]).collect();
+    let votes_for_noise = |point: usize| {
+        let has_plane = |ratio: f32| noisy_plane(tree, groups, point, ratio * noises[point]?);
+        let plane = NOISE_RATIOS.into_iter().find_map(has_plane);
+        plane.is_some_and(|plane| {
+            (!is_land || plane.normal.z.abs() < MAX_LEVEL)
+                && plane.has_points_on_both_sides(|index| in_crown[index])
+        })
+    };
+    let is_noise = |run: &&[usize]| {
+        progress.check()?;
+        let voters: Vec<&usize> = run.iter().step_by(run.len().div_ceil(N_VOTERS)).collect();
+        let n_votes = voters.iter().filter(|point| votes_for_noise(***point)).count();
+        Ok(voters.len() < 2 * n_votes)
+    };
+    let runs: Vec<&[usize]> = points.chunks(RUN_SIZE).collect();
+    let are_noise = runs.par_iter().map(is_noise).collect::<Result<Vec<bool>>>()?;
+    let noise = runs.iter().zip(are_noise).filter(|(_, is_noise)| *is_noise);
+    noise.flat_map(|(run, _)| *run).for_each(|point| in_crown[*point] = false);
+    Ok(())
+}
+
+/// A plane through noisy points.
+struct NoisyPlane {
+    normal: Vec3,
+    /// Indices of the points, or those that the groups stand for, each range with the height above the plane.
+    heights: Vec<(Range<usize>, f32)>,
+}
+
+/// Returns the plane through as many neighbours of a point as a noise in spacings asks for; `None` if they lie in no plane.
+fn noisy_plane(tree: &KdTree, groups: &KdTree, point: usize, noise: f32) -> Option<NoisyPlane> {
+    let position = tree.positions()[point];
+    let (neighbors, size) = neighbors_by_noise(tree, groups, position, noise)?;
+    let positions = if size == 1 { tree.positions() } else { groups.positions() };
+    let [nearest, others @ ..] = &neighbors[..] else { return None };
+    let PlaneFit { normal, variation, .. } = fit_plane(positions, nearest.index as usize, others);
+    if MAX_NOISE_VARIATION < variation {
+        return None;
+    }
+    let sum: Vec3 = neighbors.iter().map(|other| positions[other.index as usize]).sum();
+    let center = sum / neighbors.len() as f32;
+    let height = |other: &Neighbor| {
+        let index = other.index as usize;
+        let points = size * index..tree.positions().len().min(size * (index + 1));
+        (points, normal.dot(positions[index] - center))
+    };
+    Some(NoisyPlane { normal, heights: neighbors.iter().map(height).collect() })
+}
+
+impl NoisyPlane {
+    /// True if those of the points that are rough are on both sides of the plane.
+    fn has_points_on_both_sides(&self, is_rough: impl Fn(usize) -> bool) -> bool {
+        let rough = self.heights.iter().filter(|(points, _)| points.clone().any(&is_rough));
+        let (n_rough, n_above) = rough.fold((0usize, 0usize), |(n_rough, n_above), (_, height)| {
+            (n_rough + 1, n_above + usize::from(0.0 < *height))
+        });
+        let min_on_side = MIN_ON_SIDE * n_rough as f32;
+        MIN_HEIGHTS <= n_rough && min_on_side <= n_above.min(n_rough - n_above) as f32
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    //! A tree on noisy ground.
+    //! A tree on noisy ground, and a noisy wall.
 
     use crate::math::{Random, Vec3};
     use crate::points::{Denoise, PointCloud, denoise};
@@ -134,5 +229,28 @@ mod tests {
         let n_of_ground = (0..n_ground).filter(has_moved).count();
         let n_of_crown = (n_ground..points.len()).filter(has_moved).count();
         assert!(8800 < n_of_ground && n_of_crown < 250, "{n_of_ground} {n_of_crown}");
+    }
+
+    #[test]
+    fn a_wall_with_far_more_noise_than_the_floor_is_no_crown() {
+        let mut random = Random::new(9, 0);
+        let mut points: Vec<Vec3> = Vec::new();
+        let side = |random: &mut Random| 95.0 * random.next_f32();
+        for _ in 0..9000 {
+            let height = 0.25 * random.next_gaussian() as f32;
+            points.push(Vec3::new(side(&mut random), side(&mut random), height));
+        }
+        let n_floor = points.len();
+        for _ in 0..4500 {
+            let depth = 2.5 * random.next_gaussian() as f32;
+            points.push(Vec3::new(side(&mut random), 95.0 + depth, 0.5 * side(&mut random)));
+        }
+        let mut cloud = PointCloud::from_positions(points);
+        denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().unwrap();
+        let wall = &cloud.positions[n_floor..];
+        // Above the floor, whose points are as near as those of the wall.
+        let is_off = |p: &&Vec3| 10.0 < p.z && 1.5 < (p.y - 95.0).abs();
+        let n_off = wall.iter().filter(is_off).count();
+        assert!(20 * n_off < wall.len(), "{n_off} of {}", wall.len());
     }
 }
