@@ -28,6 +28,7 @@ use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
 use surfel_core::surface::gaussian;
+use surfel_core::surface::leaves::{self, LEAVES};
 use surfel_core::surface::mls;
 use surfel_core::surface::smooth;
 use surfel_core::surface::{
@@ -46,7 +47,20 @@ pub fn constants() -> String {
         integers.into_iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
     let floats =
         floats().into_iter().map(|(name, value)| format!("const {name}: f32 = {value:?}f;\n"));
-    integers.chain(floats).collect()
+    integers.chain(floats).chain(leaf_arrays()).collect()
+}
+
+/// Returns the declarations of the centres and normals of the leaves of a cluster.
+fn leaf_arrays() -> [String; 3] {
+    let array = |name: &str, part: usize| {
+        let vectors = LEAVES.map(|leaf| {
+            format!("vec3<f32>({:?}, {:?}, {:?})", leaf[part][0], leaf[part][1], leaf[part][2])
+        });
+        let n_leaves = LEAVES.len();
+        format!("const {name} = array<vec3<f32>, {n_leaves}>({});\n", vectors.join(", "))
+    };
+    let n_leaves = format!("const N_LEAVES: u32 = {}u;\n", LEAVES.len());
+    [n_leaves, array("LEAF_CENTERS", 0), array("LEAF_NORMALS", 1)]
 }
 
 fn kinds() -> Vec<(&'static str, u32)> {
@@ -60,6 +74,7 @@ fn kinds() -> Vec<(&'static str, u32)> {
         ("OCTREE", SurfaceKind::Octree),
         ("SMOOTH", SurfaceKind::Smooth),
         ("CAPSULE", SurfaceKind::Capsule),
+        ("LEAVES", SurfaceKind::Leaves),
     ];
     kinds.into_iter().map(|(name, kind)| (name, surface_number(kind))).collect()
 }
@@ -183,6 +198,8 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("MIN_DIRECTION", MIN_DIRECTION),
         ("CAPSULE_ASPECT", CAPSULE_ASPECT),
         ("MIN_ACROSS", capsule::MIN_ACROSS),
+        ("LEAF_RADIUS", leaves::LEAF_RADIUS),
+        ("LEAVES_REACH", leaves::REACH),
         ("MIN_DISC_WEIGHT", MIN_DISC_WEIGHT),
         ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
         ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),

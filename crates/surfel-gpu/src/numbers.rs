@@ -192,7 +192,7 @@ pub mod attribute {
 }
 
 /// The surface kinds in the order of their numbers.
-pub const SURFACES: [SurfaceKind; 14] = [
+pub const SURFACES: [SurfaceKind; 15] = [
     SurfaceKind::Points,
     SurfaceKind::Sphere,
     SurfaceKind::Disc,
@@ -207,6 +207,7 @@ pub const SURFACES: [SurfaceKind; 14] = [
     SurfaceKind::Gaussian,
     SurfaceKind::Smooth,
     SurfaceKind::Capsule,
+    SurfaceKind::Leaves,
 ];
 
 /// The number that stands for triangles beside those of surface kinds.
@@ -229,6 +230,7 @@ pub fn surface_number(kind: SurfaceKind) -> u32 {
         SurfaceKind::Gaussian => 11,
         SurfaceKind::Smooth => 12,
         SurfaceKind::Capsule => 13,
+        SurfaceKind::Leaves => 14,
     }
 }
 

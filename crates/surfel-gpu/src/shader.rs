@@ -100,6 +100,7 @@ const TREE: &[&str] = parts![
     "surface/disc.wgsl",
     "surface/sphere.wgsl",
     "surface/capsule.wgsl",
+    "surface/leaves.wgsl",
     "surface/mls_ball.wgsl",
     "surface/kind.wgsl",
 ];
@@ -300,7 +301,9 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[CLOSEST_SINGLE_RAY, CLOSEST, SOLIDS],
+                    Surface::Sphere | Surface::Capsule | Surface::Leaves => {
+                        &[CLOSEST_SINGLE_RAY, CLOSEST, SOLIDS]
+                    }
                     Surface::Disc => {
                         &[CLOSEST_SINGLE_RAY, CLOSEST, REGION, EDGE, DISCS, WITHIN_EDGE]
                     }
@@ -353,9 +356,11 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule | Surface::DiscRims | Surface::SplatRims => {
-                        &[ANY_SINGLE_RAY, ANY]
-                    }
+                    Surface::Sphere
+                    | Surface::Capsule
+                    | Surface::Leaves
+                    | Surface::DiscRims
+                    | Surface::SplatRims => &[ANY_SINGLE_RAY, ANY],
                     Surface::Triangle => &[ANY_SINGLE_RAY, TRIANGLES],
                     Surface::Disc | Surface::Splat | Surface::SplatFit => {
                         &[GROUP, ANY_TESTED, REGION, EDGE, EDGE_FILTER]

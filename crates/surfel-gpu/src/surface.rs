@@ -11,6 +11,8 @@ pub enum Surface {
     Sphere,
     /// Capsules.
     Capsule,
+    /// Clusters of leaves.
+    Leaves,
     /// Flat discs.
     Disc,
     /// Flat discs up to their rims.
@@ -39,9 +41,10 @@ pub enum Surface {
 
 impl Surface {
     /// Every surface.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Sphere,
         Self::Capsule,
+        Self::Leaves,
         Self::Disc,
         Self::DiscRims,
         Self::Splat,
@@ -66,6 +69,7 @@ impl Surface {
             SurfaceKind::Splat | SurfaceKind::SplatMean if has_rims => Some(Self::SplatRims),
             SurfaceKind::Sphere => Some(Self::Sphere),
             SurfaceKind::Capsule => Some(Self::Capsule),
+            SurfaceKind::Leaves => Some(Self::Leaves),
             SurfaceKind::Disc => Some(Self::Disc),
             SurfaceKind::Splat | SurfaceKind::SplatMean => Some(Self::Splat),
             SurfaceKind::Smooth => Some(Self::Smooth),
@@ -96,7 +100,7 @@ impl Surface {
             Self::Octree => surface_number(SurfaceKind::Octree),
             Self::OctreeSplat => surface_number(SurfaceKind::OctreeSplat),
             Self::Triangle => TRIANGLE,
-            Self::Sphere | Self::Capsule | Self::Disc | Self::DiscRims => {
+            Self::Sphere | Self::Capsule | Self::Leaves | Self::Disc | Self::DiscRims => {
                 surface_number(self.shape())
             }
         }
@@ -130,6 +134,7 @@ impl Surface {
         match self {
             Self::Sphere => SurfaceKind::Sphere,
             Self::Capsule => SurfaceKind::Capsule,
+            Self::Leaves => SurfaceKind::Leaves,
             Self::Mls(_) => SurfaceKind::Mls,
             Self::Disc
             | Self::DiscRims

@@ -34,7 +34,7 @@ pub fn trees(cloud: &FlatCloud) -> [(SurfaceKind, &surfel_core::flat::FlatPoints
     [
         (cloud.surface, &cloud.points),
         (SurfaceKind::Capsule, &cloud.lines),
-        (SurfaceKind::Sphere, &cloud.scatter),
+        (cloud.scatter_kind(), &cloud.scatter),
     ]
 }
 

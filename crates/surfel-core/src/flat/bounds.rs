@@ -3,7 +3,7 @@
 use super::block::PointBlock;
 use crate::math::{Aabb, Floats, Lanes, PortableLanes, Vec3};
 use crate::points::CAPSULE_ASPECT;
-use crate::surface::SurfaceKind;
+use crate::surface::{SurfaceKind, leaves};
 
 /// Relative margin of radii for rounding here and in the kernels.
 const RADIUS_ROUNDING: f32 = 4e-6;
@@ -28,6 +28,7 @@ pub(super) fn block_bounds(kind: SurfaceKind, block: &PointBlock) -> Aabb {
                 let thickness = radius * PortableLanes::splat(1.0 / CAPSULE_ASPECT);
                 (radius - thickness) * along + thickness
             }
+            SurfaceKind::Leaves => radius * PortableLanes::splat(leaves::REACH),
             _ if kind.uses_discs() => radius * across,
             _ => radius,
         };

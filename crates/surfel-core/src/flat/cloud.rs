@@ -26,8 +26,10 @@ pub struct FlatCloud {
     pub points: FlatPoints,
     /// Points of lines, as capsules.
     pub lines: FlatPoints,
-    /// Points that stand for themselves, as spheres.
+    /// Scattered points.
     pub scatter: FlatPoints,
+    /// True if scattered points are clusters of leaves; false if they are spheres.
+    pub has_leaves: bool,
     /// The kd-tree over the field of weighted planes; empty unless that is the surface.
     pub field: Box<FieldTree>,
     /// The octree whose cells are the surface; empty unless they are.
@@ -124,6 +126,7 @@ impl FlatCloud {
             points,
             lines,
             scatter,
+            has_leaves: geometry.has_leaves(),
             field: Box::default(),
             octree: Box::default(),
             gaussians: Box::default(),
@@ -178,9 +181,15 @@ impl FlatCloud {
     pub fn points_of(&self, surface: SurfaceKind) -> &FlatPoints {
         match surface {
             SurfaceKind::Capsule => &self.lines,
+            SurfaceKind::Leaves => &self.scatter,
             SurfaceKind::Sphere if self.surface != SurfaceKind::Sphere => &self.scatter,
             _ => &self.points,
         }
+    }
+
+    /// Returns the shape of scattered points.
+    pub fn scatter_kind(&self) -> SurfaceKind {
+        scatter_kind(self.has_leaves)
     }
 
     /// True if the discs of the surface's points have no normals, and face each ray.
@@ -266,8 +275,13 @@ fn parts<'a>(columns: PointColumns<'a>, geometry: &'a CloudGeometry) -> Option<P
     Some(Parts {
         surface: part(geometry.surface, Structure::Surface),
         lines: part(SurfaceKind::Capsule, Structure::Line),
-        scatter: part(SurfaceKind::Sphere, Structure::Scatter),
+        scatter: part(scatter_kind(geometry.has_leaves()), Structure::Scatter),
     })
+}
+
+/// Returns the shape of scattered points.
+fn scatter_kind(has_leaves: bool) -> SurfaceKind {
+    if has_leaves { SurfaceKind::Leaves } else { SurfaceKind::Sphere }
 }
 
 /// Returns the bounding box of a tree.

@@ -5,7 +5,7 @@ use crate::bvh::{BvhPrimitive, NO_PRIMITIVE};
 use crate::error::{Error, Result};
 use crate::math::{Aabb, LANES, Vec3};
 use crate::points::{Structure, check_length};
-use crate::surface::SurfaceKind;
+use crate::surface::{SurfaceKind, leaves};
 use rayon::prelude::*;
 
 /// The columns of a cloud that the flat form keeps, with one entry for each point.
@@ -79,9 +79,13 @@ impl<'a> PointColumns<'a> {
     /// Returns the point with index `id`, its radius scaled for the surface kind.
     pub(super) fn point(&self, id: u32) -> BlockPoint {
         let i = id as usize;
+        let normal = match self.kind {
+            SurfaceKind::Leaves => Some(leaves::mirror(id)),
+            _ => self.normals.get(i).copied(),
+        };
         BlockPoint {
             position: self.positions[i],
-            normal: self.normals.get(i).map_or(Vec3::Z, |normal| normal_or_z(*normal)),
+            normal: normal.map_or(Vec3::Z, normal_or_z),
             radius: if self.has_radii() { self.radius_factor * self.radii[i] } else { 0.0 },
             color: self.colors[i],
         }

@@ -72,5 +72,6 @@ pub use structure::point_shape::{
     PointShape, STRUCTURE, Structure, StructureChoice, StructureReport,
 };
 pub use structure::solids::CAPSULE_ASPECT;
+pub use structure::vegetation::has_leaves;
 pub use up::{InferredUp, UpConvention, infer_up};
 pub(crate) use up::{is_camera_frame, is_in_camera_view};

@@ -2,7 +2,7 @@
 
 use super::color::SupportColors;
 use crate::error::Result;
-use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
+use crate::points::{PointCloud, PreparedCloud, Structure, check_length, has_leaves};
 use crate::surface::{EdgeTest, OctreeDepth, SurfaceKind, SurfaceOptions};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
@@ -13,6 +13,8 @@ pub struct CloudGeometry {
     colors: Vec<[u8; 3]>,
     /// The structure of each point; none if all are part of a surface.
     structures: Option<Vec<Structure>>,
+    /// True if scattered points are leaves; false if each is a ball.
+    has_leaves: bool,
     /// The surface that the points describe.
     pub surface: SurfaceKind,
     /// Options of that surface.
@@ -43,6 +45,7 @@ impl Default for CloudGeometry {
             cloud: PreparedCloud::default(),
             colors: Vec::new(),
             structures: None,
+            has_leaves: false,
             surface: SurfaceKind::default(),
             options: SurfaceOptions::default(),
             edge_test: EdgeTest::default(),
@@ -65,13 +68,24 @@ impl CloudGeometry {
     /// point.
     pub fn new(cloud: PreparedCloud, colors: Vec<[u8; 3]>) -> Result<Self> {
         check_length("colours", colors.len(), cloud.len())?;
-        Ok(Self { structures: structures(&cloud), cloud, colors, ..Self::default() })
+        Ok(Self { colors, ..Self::without_colors(cloud) })
     }
 
     /// Makes a geometry of the default surface with one sRGB-encoded colour for all points.
     pub fn with_uniform_color(cloud: PreparedCloud, color: [u8; 3]) -> Self {
         let colors = vec![color; cloud.len()];
-        Self { structures: structures(&cloud), cloud, colors, ..Self::default() }
+        Self { colors, ..Self::without_colors(cloud) }
+    }
+
+    fn without_colors(cloud: PreparedCloud) -> Self {
+        let structures = structures(&cloud);
+        let has_leaves = structures.as_ref().is_some_and(|all| has_leaves(&cloud, all));
+        Self { structures, has_leaves, cloud, ..Self::default() }
+    }
+
+    /// Returns true if scattered points are leaves; false if each is a ball.
+    pub fn has_leaves(&self) -> bool {
+        self.has_leaves
     }
 
     /// Returns the structure of each point, or none if all points are part of the surface.

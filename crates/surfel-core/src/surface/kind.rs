@@ -2,6 +2,7 @@
 
 use super::capsule;
 use super::disc;
+use super::leaves;
 use super::mls;
 use super::smooth;
 use super::sphere;
@@ -55,6 +56,9 @@ pub enum SurfaceKind {
     /// Each point is a short thick line along its normal. The points of lines have this kind, whatever the kind of
     /// their cloud's surface is.
     Capsule,
+    /// Each point is a cluster of small discs. Scattered points have this kind, whatever the kind of their cloud's
+    /// surface is.
+    Leaves,
 }
 
 impl SurfaceKind {
@@ -75,9 +79,13 @@ impl SurfaceKind {
         ("gaussian", Self::Gaussian),
     ];
 
-    /// Returns the name that `from_str` parses.
+    /// Returns the name that `from_str` parses; that of a kind that no cloud can be given is no more than a name.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("capsule", |(name, _)| name)
+        match self {
+            Self::Capsule => "capsule",
+            Self::Leaves => "leaves",
+            _ => Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name),
+        }
     }
 
     /// Returns the factor that multiplies the points' radii before tracing, unless options choose another one.
@@ -96,7 +104,10 @@ impl SurfaceKind {
 
     /// Returns true if points are discs with normals rather than spheres or balls.
     pub fn uses_discs(self) -> bool {
-        !matches!(self, Self::Points | Self::Sphere | Self::Mls | Self::Capsule | Self::Gaussian)
+        !matches!(
+            self,
+            Self::Points | Self::Sphere | Self::Mls | Self::Capsule | Self::Leaves | Self::Gaussian
+        )
     }
 
     /// Returns true if the shape of the points depends on their normals.
@@ -121,6 +132,7 @@ impl SurfaceKind {
                 sphere::bounds(center, radius)
             }
             Self::Capsule => capsule::bounds(center, normal, radius),
+            Self::Leaves => sphere::bounds(center, leaves::REACH * radius),
             _ => disc::bounds(center, normal, radius),
         }
     }

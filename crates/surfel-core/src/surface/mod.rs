@@ -7,6 +7,7 @@ pub mod edge_test;
 mod field;
 pub mod gaussian;
 mod kind;
+pub mod leaves;
 pub mod mls;
 mod octree_depth;
 pub mod options;
@@ -27,6 +28,7 @@ pub use edge_test::{
 pub use field::{FIELD_SUPPORT, FieldPoint, FieldSums, MIN_FIELD_WEIGHT};
 pub use gaussian::{GaussianLanes, WhitenedGaussian};
 pub use kind::{SOLID_ROUNDING, SOLID_SPAWN_OFFSET, SurfaceKind};
+pub use leaves::Leaves;
 pub use octree_depth::OctreeDepth;
 pub use options::{GatherLimit, SurfaceOptions};
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};

@@ -153,6 +153,15 @@ fn lines_and_scatter_are_equal() {
 }
 
 #[test]
+fn leaves_are_equal() {
+    let scene = Scene { lights: reference::lights(), ..scenes::lit(crate::leaves::tree()) };
+    let mut scene = flat(&scene);
+    scene.camera.position = DVec3::new(4.0, -3.0, 3.0);
+    assert!(scene.clouds().all(|cloud| cloud.has_leaves));
+    check("leaves", &scene, &SETTINGS);
+}
+
+#[test]
 fn cameras_are_equal() {
     let projections = [
         ("orthographic", Projection::Orthographic { height: 4.0 }),

@@ -15,6 +15,7 @@ mod gaussians;
 mod glass;
 mod implicit;
 mod instances;
+mod leaves;
 mod light;
 mod many_instances;
 mod materials;

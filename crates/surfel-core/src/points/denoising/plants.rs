@@ -28,7 +28,7 @@ const N_NEIGHBORS: usize = 24;
 const MIN_ROUGH_FRACTION: f32 = 0.75;
 /// Minimum fraction of the points in crowns: fewer are on ears, claws and other small parts of a surface.
 const MIN_IN_CROWNS: f32 = 0.05;
-/// The same on land.
+/// Minimum on land.
 const MIN_IN_CROWNS_ON_LAND: f32 = 0.01;
 /// Number of rough points near each other that are in a crown together, or in the noise of a surface.
 const RUN_SIZE: usize = 128;

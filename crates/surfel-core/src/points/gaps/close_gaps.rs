@@ -3,7 +3,7 @@
 //!
 //! The nearest neighbours of a point by a gap lie on one side of it, so that its disc ends before the gap. Where points of
 //! the same surface lie beyond, on all sides, the discs are widened until both sides reach each other. Around an open
-//! border no points lie beyond.
+//! border no points lie beyond. Land under trees has wide gaps where crowns hide it, which are closed as well.
 
 use super::free_space::FreeSpace;
 use crate::error::Result;
@@ -24,6 +24,11 @@ const MIN_EMPTY: usize = 3;
 const N_CANDIDATES: usize = 16;
 /// Maximum width of a gap, in radii of the disc from which it is seen.
 const MAX_WIDTH: f32 = 1.5;
+/// Number of candidates and greatest width on land under trees, where the points beyond wide gaps are sought among more.
+const N_CANDIDATES_UNDER_TREES: usize = 64;
+const MAX_WIDTH_UNDER_TREES: f32 = 3.0;
+/// Minimum cosine between the normal of such land and that of a disc on it.
+const MIN_LAND_COSINE: f32 = 0.8;
 /// Minimum cosine between the normals of the two sides of a gap.
 const MIN_COSINE: f32 = 0.9;
 /// Maximum height of one side above the plane of the other, by their distance.
@@ -50,7 +55,8 @@ pub fn is_by_gap(positions: &[Vec3], point: usize, neighbors: &[Neighbor], norma
 }
 
 /// Widens the discs on both sides of gaps until they reach each other, as far as no scanner saw through the gap. `radii`
-/// are the distances to the nearest neighbours, and `is_by_gap` has an entry for each point.
+/// are the distances to the nearest neighbours, and `is_by_gap` has an entry for each point. `land` is the normal, of either
+/// sign, of land under trees.
 ///
 /// # Errors
 ///
@@ -60,6 +66,7 @@ pub fn close_gaps(
     radii: &[f32],
     is_by_gap: &[bool],
     free_space: &FreeSpace,
+    land: Option<Vec3>,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
@@ -71,8 +78,13 @@ pub fn close_gaps(
         progress.check()?;
         let own = &sides[index];
         let point = own.point as usize;
-        let max_distance = MAX_WIDTH * shapes[point].radius;
-        let others = octaves.nearest(&trees, tree.positions()[point], max_distance);
+        let is_on_land = |land: Vec3| MIN_LAND_COSINE < land.dot(shapes[point].normal).abs();
+        let (max_width, n_candidates) = match land.is_some_and(is_on_land) {
+            true => (MAX_WIDTH_UNDER_TREES, N_CANDIDATES_UNDER_TREES),
+            false => (MAX_WIDTH, N_CANDIDATES),
+        };
+        let max_distance = max_width * shapes[point].radius;
+        let others = octaves.nearest(&trees, tree.positions()[point], n_candidates, max_distance);
         Ok(widened(own, others, &sides, tree.positions(), shapes))
     };
     let links = (0..sides.len()).into_par_iter().map(links);
@@ -157,11 +169,17 @@ impl Octaves {
         Self { sides, positions }
     }
 
-    /// Returns the sides near a position, nearest first; the one at the position is among them. The index of each is its
-    /// place among all sides.
-    fn nearest(&self, trees: &[KdTree], position: Vec3, max_distance: f32) -> Vec<Neighbor> {
+    /// Returns the sides near a position, up to `n_candidates` of each octave, nearest first; the one at the position is among
+    /// them. The index of each is its place among all sides.
+    fn nearest(
+        &self,
+        trees: &[KdTree],
+        position: Vec3,
+        n_candidates: usize,
+        max_distance: f32,
+    ) -> Vec<Neighbor> {
         let of_tree = |(tree, sides): (&KdTree, &Vec<u32>)| {
-            let mut neighbors = tree.nearest_within(position, N_CANDIDATES, max_distance);
+            let mut neighbors = tree.nearest_within(position, n_candidates, max_distance);
             neighbors.iter_mut().for_each(|found| found.index = sides[found.index as usize]);
             neighbors
         };
@@ -245,7 +263,7 @@ fn is_one_surface(
 
 #[cfg(test)]
 mod tests {
-    //! Planes whose density jumps.
+    //! Planes whose density jumps, and land under a tree.
 
     use super::*;
     use crate::math::Random;
@@ -282,6 +300,27 @@ mod tests {
         assert!(5 * n_inside < at_gap.len(), "{n_inside} of {}", at_gap.len());
         let around_nothing = radii(0.0);
         assert!(!around_nothing.iter().any(is_wide), "an open border stays as it is");
+    }
+
+    #[test]
+    fn land_is_closed_under_trees() {
+        let mut random = Random::new(3, 0);
+        let mut within = |size: f32| size * (random.next_f32() - 0.5);
+        // The gap is 9 wide, the points of the land are 1 apart.
+        let land = (0..1600).map(|i| [i % 40, i / 40].map(|at| at as f32 - 19.5));
+        let land = land.map(|[x, y]| Vec3::new(x + within(0.6), y + within(0.6), within(0.1)));
+        let land: Vec<Vec3> = land.filter(|at| 4.5 < at.truncate().length()).collect();
+        let crown: Vec<Vec3> =
+            (0..800).map(|_| Vec3::new(within(8.0), within(8.0), 9.0 + within(8.0))).collect();
+        let covers_middle = |points: &[Vec3]| {
+            let cloud = PointCloud::from_positions(points.to_vec());
+            let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+            let on_land = cloud.positions.iter().zip(cloud.radii()).take(land.len());
+            on_land.filter(|(at, radius)| at.length() < **radius).count()
+        };
+        let n_covering = covers_middle(&[&land[..], &crown].concat());
+        assert!(3 < n_covering, "{n_covering}");
+        assert_eq!(covers_middle(&land), 0, "without trees the gap may be a pond");
     }
 
     #[test]

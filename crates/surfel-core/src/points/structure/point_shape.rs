@@ -124,7 +124,7 @@ pub struct PointShape {
     pub structure: Structure,
     /// Unit normal of a surface, unit direction of a line; zero if unknown.
     pub normal: Vec3,
-    /// Radius of a disc, half the length of a capsule, or radius of a ball.
+    /// Radius of a disc, half the length of a capsule, or radius of a ball or of a cluster of leaves.
     pub radius: f32,
 }
 

@@ -2,16 +2,41 @@
 
 use super::point_shape::{PointShape, Structure};
 use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::points::PointCloud;
+use crate::points::up::is_mostly_land;
 
 /// Minimum fraction of scattered points in a cloud with much vegetation.
 pub const MIN_VEGETATION: f32 = 0.2;
 /// Minimum fraction of scattered points among the rough ones of a cloud that is leafy, not noisy.
 const MIN_SCATTERED_ROUGH: f32 = 0.5;
+/// Minimum number of scattered points of a scanned plant: sparse points of a thin object are scattered, too.
+const MIN_LEAVES: usize = 10_000;
+/// ASPRS classes of low, medium and high vegetation.
+const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
+
+/// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those on land,
+/// those that the file calls vegetation, and those of clouds with much of them. If all points are scattered, each stands for
+/// itself.
+pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
+    let is_scattered = |structure: &&Structure| **structure == Structure::Scatter;
+    let n_scattered = structures.iter().filter(is_scattered).count();
+    if n_scattered == structures.len() {
+        return false;
+    }
+    let is_plant = |class: &u8| VEGETATION_CLASSES.contains(class);
+    MIN_LEAVES.max((MIN_VEGETATION * structures.len() as f32) as usize) <= n_scattered
+        || cloud.classification.as_deref().is_some_and(|classes| classes.iter().any(is_plant))
+        || is_mostly_land(&cloud.positions)
+}
 
 /// Returns true if much of the cloud is vegetation: many points are scattered, and not by noise.
 pub fn is_vegetated(shapes: &[PointShape], n_rough: usize) -> bool {
-    let n_scattered = count_scattered(shapes);
-    !is_noisy(n_scattered, n_rough) && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32
+    !is_noisy(count_scattered(shapes), n_rough) && has_many_scattered(shapes)
+}
+
+/// Returns true if much of a cloud is scattered.
+pub fn has_many_scattered(shapes: &[PointShape]) -> bool {
+    MIN_VEGETATION * shapes.len() as f32 <= count_scattered(shapes) as f32
 }
 
 /// Returns true if most of the points whose nearest neighbours lie in no plane are not scattered: the cloud is noisy rather
@@ -34,4 +59,46 @@ pub fn land_normal(shapes: &[PointShape]) -> Vec3 {
         scatter.add_outer(shape.normal.as_dvec3(), -1.0);
     }
     smallest_eigenvector(&scatter).0.as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    //! Scattered points of objects, of land and of plants.
+
+    use super::*;
+    use crate::math::Random;
+
+    /// Returns points in a box, of which the first are scattered.
+    fn cloud(n_points: usize, n_scattered: usize, size: Vec3) -> (PointCloud, Vec<Structure>) {
+        let mut random = Random::new(2, 0);
+        let mut within = || Vec3::from_array(std::array::from_fn(|_| random.next_f32()));
+        let positions = (0..n_points).map(|_| size * within()).collect();
+        let mut structures = vec![Structure::Surface; n_points];
+        structures[..n_scattered].fill(Structure::Scatter);
+        (PointCloud::from_positions(positions), structures)
+    }
+
+    #[test]
+    fn scattered_points_of_objects_are_no_leaves() {
+        let cube = Vec3::ONE;
+        for (n_points, n_scattered, size, expected) in [
+            (2000, 1500, cube, false),
+            (100_000, 12_000, cube, false),
+            (50_000, 12_000, cube, true),
+            (12_000, 12_000, cube, false),
+            (2000, 20, Vec3::new(200.0, 200.0, 8.0), true),
+        ] {
+            let (cloud, structures) = cloud(n_points, n_scattered, size);
+            assert_eq!(has_leaves(&cloud, &structures), expected, "{n_scattered} of {n_points}");
+        }
+    }
+
+    #[test]
+    fn what_a_file_calls_vegetation_is_leaves() {
+        let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
+        for (class, expected) in [(2, false), (3, true), (5, true), (6, false)] {
+            cloud.classification = Some([vec![1; 99], vec![class]].concat());
+            assert_eq!(has_leaves(&cloud, &structures), expected, "{class}");
+        }
+    }
 }

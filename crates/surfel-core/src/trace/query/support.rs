@@ -9,14 +9,14 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 /// The measured points behind a hit. It tells apart what is measured and what is bridged between points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Support {
-    /// Number of points within one radius of the hit: 1 on a ball, a capsule, a Gaussian or a rasterised point, each of which is one
-    /// point, and 0 on triangles and where nothing was hit.
+    /// Number of points within one radius of the hit: 1 on a ball, a capsule, a cluster of leaves, a Gaussian or a
+    /// rasterised point, each of which is one point, and 0 on triangles and where nothing was hit.
     pub n_points: u32,
     /// Distance from the hit to the nearest point, in radii of the point that was hit: 0 at a point, and about 1 as far
     /// from all points as a surface reaches. Infinite on triangles and where nothing was hit.
     ///
-    /// Balls and capsules are hit on their outside; there it is the distance from the point to the ray. That of a Gaussian is
-    /// in its standard deviations.
+    /// Balls, capsules and leaves are hit beside their point; there it is the distance from the point to the ray. That of a
+    /// Gaussian is in its standard deviations.
     pub distance: f32,
 }
 

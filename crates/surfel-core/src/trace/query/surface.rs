@@ -1,8 +1,11 @@
-//! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
+//! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres; and its lines
+//! and scattered points.
 
 use crate::flat::{FlatCloud, FlatPoints};
 use crate::math::{Lanes, Ray, Vec3};
-use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
+use crate::surface::capsule;
+use crate::surface::leaves;
+use crate::surface::{Capsule, Disc, EdgeTest, Leaves, Sphere, SurfaceKind, Surfel};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::edge_filter::EdgeFilter;
@@ -69,7 +72,10 @@ fn surface_hits_kernel<L: Lanes>(
         }
     }
     merge_solids::<L, Capsule>(&cloud.lines, SurfaceKind::Capsule, rays, hits);
-    merge_solids::<L, Sphere>(&cloud.scatter, SurfaceKind::Sphere, rays, hits);
+    match cloud.has_leaves {
+        true => merge_solids::<L, Leaves>(&cloud.scatter, SurfaceKind::Leaves, rays, hits),
+        false => merge_solids::<L, Sphere>(&cloud.scatter, SurfaceKind::Sphere, rays, hits),
+    }
     if let Some(colors) = &cloud.support_colors {
         for (ray, hit) in rays.iter().zip(hits).filter(|(_, hit)| !hit.is_miss()) {
             let nearest = Hit { distance: hit.distance, slot: hit.slot };
@@ -135,7 +141,10 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
         surface_occlusions::<L>(cloud, rays, occluded);
     }
     merge_occlusions::<L, Capsule>(&cloud.lines, rays, occluded);
-    merge_occlusions::<L, Sphere>(&cloud.scatter, rays, occluded);
+    match cloud.has_leaves {
+        true => merge_occlusions::<L, Leaves>(&cloud.scatter, rays, occluded),
+        false => merge_occlusions::<L, Sphere>(&cloud.scatter, rays, occluded),
+    }
 }
 
 /// Finds out for each ray whether the surface of a cloud that has one lies in its range.
@@ -202,6 +211,7 @@ fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
         let position = ray.at(nearest.distance);
         let outward = match surface {
             SurfaceKind::Capsule => capsule::normal(position, center, normal, radius),
+            SurfaceKind::Leaves => leaves::normal(position, center, normal, radius),
             _ => position - center,
         };
         let outward = outward.normalize_or(-ray.direction);
@@ -213,7 +223,7 @@ fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
             normal: if outward.dot(ray.direction) < 0.0 { outward } else { -outward },
             color,
             surface,
-            is_backface: 0.0 < outward.dot(ray.direction),
+            is_backface: surface != SurfaceKind::Leaves && 0.0 < outward.dot(ray.direction),
         };
     }
 }

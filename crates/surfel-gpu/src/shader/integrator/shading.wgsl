@@ -147,13 +147,14 @@ fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
         return;
     }
     var rounding = 4.0 * EPSILON * largest(abs(position));
-    if hit.surface == SPHERE || hit.surface == CAPSULE {
+    let is_solid = hit.surface == SPHERE || hit.surface == CAPSULE || hit.surface == LEAVES;
+    if is_solid {
         rounding = SOLID_ROUNDING * magnitude;
     }
     var offset = SOLID_SPAWN_OFFSET;
     var t_min = 0.0;
     var radius = hit.radius;
-    if hit.surface != SPHERE && hit.surface != CAPSULE {
+    if !is_solid {
         radius *= instances[hit.instance].spawn_factor;
     }
     if hit.surface == SMOOTH || hit.surface == IMPLICIT {
@@ -163,7 +164,7 @@ fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
     } else if hit.surface == MLS {
         offset = MLS_SPAWN_OFFSET;
         t_min = MLS_SPAWN_T_MIN;
-    } else if hit.surface != SPHERE && hit.surface != CAPSULE {
+    } else if !is_solid {
         offset = DISC_SPAWN_OFFSET;
         t_min = DISC_SPAWN_T_MIN;
     }

@@ -7,6 +7,8 @@ fn intersect_four(four: FourPoints, ray: Ray) -> vec4<f32> {
         distances = intersect_spheres(four, ray);
     } else if SHAPE == CAPSULE {
         distances = intersect_capsules(four, ray);
+    } else if SHAPE == LEAVES {
+        distances = intersect_leaves(four, ray);
     } else if SHAPE == MLS {
         distances = intersect_balls(four, ray);
     } else {

@@ -17,7 +17,7 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     let point = slot_point(hit.slot, position);
     let to_center = point.center;
     let radius = point.radius / visits[visit_idx].radius_factor;
-    if SHAPE == SPHERE || SHAPE == CAPSULE {
+    if SHAPE == SPHERE || SHAPE == CAPSULE || SHAPE == LEAVES {
         let across = to_center - dot(to_center, ray.direction) * ray.direction;
         hits[ray_idx].support_count = 1u;
         hits[ray_idx].support_distance = length(across) / radius;

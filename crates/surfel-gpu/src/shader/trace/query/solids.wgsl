@@ -1,4 +1,4 @@
-// Points as solids: spheres and capsules.
+// Points as solids: spheres, capsules and clusters of leaves.
 
 fn surface_hit(ray: Ray) -> SurfaceHit {
     let nearest = closest_hit(ray);
@@ -10,10 +10,12 @@ fn surface_hit(ray: Ray) -> SurfaceHit {
     var outward = position - surfel.center;
     if SHAPE == CAPSULE {
         outward = capsule_normal(position, surfel);
+    } else if SHAPE == LEAVES {
+        outward = leaf_normal(position, surfel);
     }
     let squared = dot(outward, outward);
     outward = select(-ray.direction, outward * inverseSqrt(max(squared, 1e-37)), 1e-37 < squared);
     let along = dot(outward, ray.direction);
     let normal = select(-outward, outward, along < 0.0);
-    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color, 0.0 < along);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color, SHAPE != LEAVES && 0.0 < along);
 }
