@@ -49,6 +49,7 @@ pub use cloud::gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
+pub use cloud::kept_points::KeptPoints;
 pub use cloud::known_column::{KnownColumn, is_label, name_of_pdal, plain_name};
 pub use cloud::merge::merge;
 pub(crate) use cloud::point_cloud::check_count;

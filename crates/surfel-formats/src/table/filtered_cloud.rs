@@ -1,9 +1,7 @@
 //! The points of a file that a filter keeps, read in batches.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
-use surfel_core::points::{PointCloud, PointFilter};
+use surfel_core::points::{KeptPoints, PointCloud, PointFilter};
 
 use super::column_slices::{ColumnSlices, resize, resize_checked, shrink};
 use crate::error::Result;
@@ -64,7 +62,8 @@ impl<'a> FilteredCloud<'a> {
             })
             .collect();
         tasks.into_par_iter().for_each(|(matches, from, mut to)| {
-            to.copy_ranges(&from, &ranges(matches));
+            let ranges: Vec<_> = KeptPoints::new(0, matches).ranges().collect();
+            to.copy_ranges(&from, &ranges);
         });
         self.n_kept += n_new;
         Ok(())
@@ -78,32 +77,12 @@ impl<'a> FilteredCloud<'a> {
     }
 }
 
-/// Returns the ranges of consecutive set flags.
-fn ranges(flags: &[bool]) -> Vec<Range<usize>> {
-    const WORD: usize = 16;
-    let mut ranges: Vec<Range<usize>> = Vec::new();
-    let mut append = |range: Range<usize>| match ranges.last_mut() {
-        Some(last) if last.end == range.start => last.end = range.end,
-        _ => ranges.push(range),
-    };
-    for (word, flags) in flags.chunks(WORD).enumerate() {
-        let start = WORD * word;
-        if flags == [true; WORD] {
-            append(start..start + WORD);
-        } else if flags.contains(&true) {
-            let set = flags.iter().enumerate().filter(|(_, flag)| **flag);
-            set.for_each(|(i, _)| append(start + i..start + i + 1));
-        }
-    }
-    ranges
-}
-
 #[cfg(test)]
 mod tests {
-    //! Points that are kept, and ranges of flags.
+    //! Points that are kept.
 
     use super::*;
-    use surfel_core::math::{Vec3, hash};
+    use surfel_core::math::Vec3;
 
     #[test]
     fn batches_of_any_size_are_filtered_also_without_room_for_all_points() {
@@ -126,21 +105,6 @@ mod tests {
             assert_eq!(cloud.intensity, Some(expected.clone()));
             let positions: Vec<Vec3> = expected.into_iter().map(Vec3::splat).collect();
             assert_eq!(cloud.positions, positions);
-        }
-    }
-
-    #[test]
-    fn ranges_hold_the_set_flags_and_do_not_touch() {
-        for n in [0, 1, 15, 16, 17, 100, 1000] {
-            for one_of in [1, 2, 3, 100] {
-                let flags: Vec<bool> = (0..n).map(|i| !hash(i).is_multiple_of(one_of)).collect();
-                for flags in [flags.clone(), flags.iter().map(|flag| !flag).collect()] {
-                    let found = ranges(&flags);
-                    assert!(found.windows(2).all(|pair| pair[0].end < pair[1].start));
-                    let set: Vec<usize> = (0..flags.len()).filter(|i| flags[*i]).collect();
-                    assert_eq!(found.into_iter().flatten().collect::<Vec<usize>>(), set);
-                }
-            }
         }
     }
 }

@@ -2,12 +2,15 @@
 
 use rayon::Scope;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Number of points of a word.
 const WORD_BITS: usize = u64::BITS as usize;
+/// Minimum number of words that a task packs.
+const WORDS_PER_TASK: usize = 1024;
 
 /// A bit for each point from a start on, set if it is kept.
-pub(super) struct KeptPoints {
+pub struct KeptPoints {
     start: usize,
     n_points: usize,
     words: Vec<u64>,
@@ -19,38 +22,46 @@ impl KeptPoints {
         let word = |flags: &[bool]| {
             flags.iter().enumerate().fold(0, |word, (i, flag)| word | u64::from(*flag) << i)
         };
-        let words = keep.par_chunks(WORD_BITS).map(word).collect();
+        let words = keep.par_chunks(WORD_BITS).with_min_len(WORDS_PER_TASK).map(word).collect();
         Self { start, n_points: keep.len(), words }
+    }
+
+    /// Returns the ranges of kept points, in ascending order. No two of them touch.
+    pub fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
+        let in_words = self.words.iter().enumerate().flat_map(|(i, word)| {
+            let (mut at, mut bits) = (self.start + WORD_BITS * i, *word);
+            std::iter::from_fn(move || {
+                if bits == 0 {
+                    return None;
+                }
+                let n_dropped = bits.trailing_zeros();
+                bits >>= n_dropped;
+                let n_kept = bits.trailing_ones();
+                bits = bits.checked_shr(n_kept).unwrap_or(0);
+                let first = at + n_dropped as usize;
+                at = first + n_kept as usize;
+                Some(first..at)
+            })
+        });
+        let mut in_words = in_words.peekable();
+        std::iter::from_fn(move || {
+            let mut range = in_words.next()?;
+            while let Some(next) = in_words.next_if(|next| next.start == range.end) {
+                range.end = next.end;
+            }
+            Some(range)
+        })
     }
 
     /// Drops the other points of a column, in place.
     fn retain<T: Copy>(&self, column: &mut Vec<T>) {
         debug_assert_eq!(column.len(), self.start + self.n_points);
-        let mut end = self.start;
-        // Kept points that are still to be moved.
-        let mut run = self.start..self.start;
-        for (i, word) in self.words.iter().enumerate() {
-            let (mut at, mut bits) = (self.start + WORD_BITS * i, *word);
-            while bits != 0 {
-                let n_dropped = bits.trailing_zeros();
-                bits >>= n_dropped;
-                let n_kept = bits.trailing_ones();
-                bits = bits.checked_shr(n_kept).unwrap_or(0);
-                at += n_dropped as usize;
-                if at != run.end {
-                    end = moved(column, run, end);
-                    run = at..at;
-                }
-                at += n_kept as usize;
-                run.end = at;
-            }
-        }
-        end = moved(column, run, end);
+        let end = self.ranges().fold(self.start, |end, range| moved(column, range, end));
         column.truncate(end);
     }
 
     /// Drops the other points of a column, if there is one, beside other work of the scope.
-    pub fn retain_in<'s, T: Copy + Send + 's>(
+    pub(super) fn retain_in<'s, T: Copy + Send + 's>(
         &'s self,
         scope: &Scope<'s>,
         column: impl Into<Option<&'s mut Vec<T>>>,
@@ -62,7 +73,7 @@ impl KeptPoints {
 }
 
 /// Moves a part of a column to `end`. Returns where it ends.
-fn moved<T: Copy>(column: &mut [T], part: std::ops::Range<usize>, end: usize) -> usize {
+fn moved<T: Copy>(column: &mut [T], part: Range<usize>, end: usize) -> usize {
     let n = part.len();
     if part.start != end {
         column.copy_within(part, end);
@@ -89,8 +100,13 @@ mod tests {
                     let is_kept = |i: &usize| *i < start || keep[*i - start];
                     let expected: Vec<usize> = column.iter().copied().filter(is_kept).collect();
                     let mut found = column;
-                    KeptPoints::new(start, &keep).retain(&mut found);
+                    let kept = KeptPoints::new(start, &keep);
+                    kept.retain(&mut found);
                     assert_eq!(found, expected, "{n} {one_of}");
+                    let ranges: Vec<Range<usize>> = kept.ranges().collect();
+                    assert!(ranges.windows(2).all(|pair| pair[0].end < pair[1].start));
+                    let in_ranges = (0..start).chain(ranges.into_iter().flatten());
+                    assert_eq!(in_ranges.collect::<Vec<_>>(), expected, "{n} {one_of}");
                 }
             }
         }

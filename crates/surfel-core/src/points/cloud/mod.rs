@@ -4,7 +4,7 @@
 
 pub mod deformation;
 pub mod scan_station;
-mod kept_points;
+pub mod kept_points;
 pub mod point_cloud;
 pub mod color_bits;
 pub mod flags;

@@ -214,13 +214,13 @@ fn reach_at(tree: &KdTree, point: u32) -> f32 {
 /// is on no other surface.
 fn is_noisier(tree: &KdTree, point: usize, noise: f32) -> bool {
     let positions = tree.positions();
-    let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
-    let n_neighbors = n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED);
-    let neighbors = tree.nearest(positions[point], n_neighbors, Some(point as u32));
-    let nearest = &neighbors[..MIN_NOISE_NEIGHBORS.min(neighbors.len())];
-    if fit_plane(positions, point, nearest).variation < MAX_PLANE_VARIATION {
+    let nearest = |n_nearest| tree.nearest(positions[point], n_nearest, Some(point as u32));
+    let few = nearest(MIN_NOISE_NEIGHBORS);
+    if fit_plane(positions, point, &few).variation < MAX_PLANE_VARIATION {
         return false;
     }
+    let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
+    let neighbors = nearest(n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED));
     let fit = fit_plane(positions, point, &neighbors);
     fit.variation < MAX_BENT_VARIATION && thins_out(positions, point, &neighbors, fit.normal)
 }
