@@ -20,15 +20,15 @@ use crate::numbers::{
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
 use surfel_core::integrator::constants as integrator;
-use surfel_core::math::MIN_DIRECTION;
 use surfel_core::math::eigen_lanes as eigen;
+use surfel_core::math::{MIN_DIRECTION, Vec3};
 use surfel_core::points::{CAPSULE_ASPECT, HARMONIC_0};
 use surfel_core::surface::align;
 use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
 use surfel_core::surface::gaussian;
-use surfel_core::surface::leaves::{self, LEAVES};
+use surfel_core::surface::leaves::{self, LEAF_CENTERS, LEAF_NORMALS};
 use surfel_core::surface::mls;
 use surfel_core::surface::smooth;
 use surfel_core::surface::{
@@ -52,15 +52,19 @@ pub fn constants() -> String {
 
 /// Returns the declarations of the centres and normals of the leaves of a cluster.
 fn leaf_arrays() -> [String; 3] {
-    let array = |name: &str, part: usize| {
-        let vectors = LEAVES.map(|leaf| {
-            format!("vec3<f32>({:?}, {:?}, {:?})", leaf[part][0], leaf[part][1], leaf[part][2])
-        });
-        let n_leaves = LEAVES.len();
+    let n_leaves = LEAF_CENTERS.len();
+    let array = |name: &str, vectors: &[Vec3]| {
+        let vectors: Vec<String> = vectors
+            .iter()
+            .map(|Vec3 { x, y, z }| format!("vec3<f32>({x:?}, {y:?}, {z:?})"))
+            .collect();
         format!("const {name} = array<vec3<f32>, {n_leaves}>({});\n", vectors.join(", "))
     };
-    let n_leaves = format!("const N_LEAVES: u32 = {}u;\n", LEAVES.len());
-    [n_leaves, array("LEAF_CENTERS", 0), array("LEAF_NORMALS", 1)]
+    [
+        format!("const N_LEAVES: u32 = {n_leaves}u;\n"),
+        array("LEAF_CENTERS", &LEAF_CENTERS),
+        array("LEAF_NORMALS", &LEAF_NORMALS),
+    ]
 }
 
 fn kinds() -> Vec<(&'static str, u32)> {

@@ -297,7 +297,7 @@ fn deformed_columns<'a>(
 ) -> Result<PointColumns<'a>> {
     let Deformed { positions, normals, radii, .. } = deformed;
     let columns = PointColumns::new(shape(geometry), positions, normals, radii, geometry.colors())?;
-    Ok(scaled(columns, geometry))
+    Ok(scaled(columns.at_rest(geometry.cloud().positions()), geometry))
 }
 
 /// Returns the shape of the points of a surface. Without normals those of `SplatFit` are balls.

@@ -21,6 +21,8 @@ pub struct PointColumns<'a> {
     radius_factor: f32,
     /// The structure of each point, and the one whose points count; none if all do.
     part: Option<(&'a [Structure], Structure)>,
+    /// The positions of the points at rest.
+    rest_positions: &'a [Vec3],
 }
 
 impl<'a> PointColumns<'a> {
@@ -46,12 +48,26 @@ impl<'a> PointColumns<'a> {
         check_length("radii", radii.len(), positions.len())?;
         check_length("colours", colors.len(), positions.len())?;
         let radius_factor = kind.radius_factor();
-        Ok(Self { kind, positions, normals, radii, colors, radius_factor, part: None })
+        Ok(Self {
+            kind,
+            positions,
+            normals,
+            radii,
+            colors,
+            radius_factor,
+            part: None,
+            rest_positions: positions,
+        })
     }
 
     /// Multiplies the radii by this factor instead of that of the surface kind.
     pub(super) fn with_radius_factor(self, radius_factor: f32) -> Self {
         Self { radius_factor, ..self }
+    }
+
+    /// States where the points are at rest, if `positions` are deformed.
+    pub(super) fn at_rest(self, rest_positions: &'a [Vec3]) -> Self {
+        Self { rest_positions, ..self }
     }
 
     /// Leaves out all points but those of one structure, which get this kind.
@@ -76,11 +92,12 @@ impl<'a> PointColumns<'a> {
         self.positions.len()
     }
 
-    /// Returns the point with index `id`, its radius scaled for the surface kind.
+    /// Returns the point with index `id`, its radius scaled for the surface kind. That of leaves has the mirror of its cluster
+    /// for a normal.
     pub(super) fn point(&self, id: u32) -> BlockPoint {
         let i = id as usize;
         let normal = match self.kind {
-            SurfaceKind::Leaves => Some(leaves::mirror(id)),
+            SurfaceKind::Leaves => Some(leaves::mirror(self.rest_positions[i])),
             _ => self.normals.get(i).copied(),
         };
         BlockPoint {

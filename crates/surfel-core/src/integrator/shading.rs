@@ -70,7 +70,8 @@ impl Shading {
             roughness: material.roughness,
             ior: material.ior,
             transmission: material.transmission,
-            is_thin: material.is_thin,
+            // A leaf has no inside.
+            is_thin: material.is_thin || hit.surface == Some(SurfaceKind::Leaves),
             emission: material.emissive,
             is_unlit: material.is_unlit,
             spawn_radius: hit.spawn_radius,

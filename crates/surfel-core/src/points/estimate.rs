@@ -17,7 +17,7 @@ use super::structure::neighborhood_stats::Typical;
 use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
-use super::structure::vegetation::{has_many_scattered, land_normal};
+use super::structure::vegetation::{count_rough, is_vegetated, land_normal};
 use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
@@ -199,7 +199,8 @@ pub fn find_shapes<'a>(
     }
     // Those between rings are closed already.
     if !is_by_gap.is_empty() && rings.is_none() {
-        let land = has_many_scattered(&shapes).then(|| land_normal(&shapes));
+        let is_wooded = is_vegetated(&shapes, count_rough(fits_of_points));
+        let land = is_wooded.then(|| land_normal(&shapes));
         close_gaps(&tree, radii, is_by_gap, &free_space, land, &mut shapes, progress)?;
     }
     if is_land {

@@ -104,7 +104,7 @@ impl CloudGeometry {
         &self.colors
     }
 
-    /// Keeps the points at `indices`, in that order.
+    /// Keeps the points at `indices`, in that order. Scattered points stay what they were in the whole cloud, leaves or balls.
     pub(super) fn retain(&mut self, indices: &[u32]) {
         self.cloud = self.cloud.subset(indices);
         self.structures = structures(&self.cloud);

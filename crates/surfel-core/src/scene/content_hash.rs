@@ -82,7 +82,7 @@ fn cloud_hash(geometry: &CloudGeometry) -> u64 {
         (
             (geometry.surface, geometry.options, geometry.edge_test, geometry.octree_depth),
             (geometry.blends_colors, geometry.support_colors, geometry.shows_trained_colors),
-            (geometry.has_outward_normals, geometry.has_front_sides),
+            (geometry.has_outward_normals, geometry.has_front_sides, geometry.has_leaves()),
         )
     );
     let mut hasher = DefaultHasher::new();
@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
     use crate::math::{DVec3, Vec3};
-    use crate::points::{Preparation, PreparedCloud, Scalar, prepare};
+    use crate::points::{Preparation, PreparedCloud, Scalar, Structure, prepare};
     use crate::progress::NoProgress;
     use crate::surface::EdgeTest;
     use std::collections::BTreeSet;
@@ -151,6 +151,23 @@ mod tests {
             points_hash(|it| *it = CloudGeometry::with_uniform_color(prepared(), [8; 3])),
         ];
         assert!(changed.iter().all(|other| *other != first), "{changed:?}");
+    }
+
+    #[test]
+    fn leaves_have_other_trees_than_balls() {
+        let with_class = |class: u8| {
+            points_hash(|geometry| {
+                let mut cloud = geometry.cloud().clone().into_inner();
+                let mut structures = vec![Structure::Surface; cloud.len()];
+                structures[..100].fill(Structure::Scatter);
+                cloud.set_structures(&structures);
+                cloud.classification = Some(vec![class; cloud.len()]);
+                let cloud = PreparedCloud::new(cloud).unwrap();
+                *geometry = CloudGeometry::with_uniform_color(cloud, [9; 3]);
+            })
+        };
+        assert_eq!(with_class(2), with_class(6));
+        assert_ne!(with_class(2), with_class(5));
     }
 
     #[test]

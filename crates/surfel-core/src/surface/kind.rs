@@ -9,7 +9,7 @@ use super::sphere;
 use crate::error::Error;
 use crate::math::{Aabb, Ray, Vec3};
 
-/// The height of the origin of secondary rays above spheres and capsules, in radii.
+/// The height of the origin of secondary rays above spheres, capsules and leaves, in radii.
 pub const SOLID_SPAWN_OFFSET: f32 = 1e-3;
 /// Rounding of a hit on a solid shape, relative to the largest coordinate on the way there: a far sphere is hit with the
 /// error of the distance.
@@ -56,8 +56,8 @@ pub enum SurfaceKind {
     /// Each point is a short thick line along its normal. The points of lines have this kind, whatever the kind of
     /// their cloud's surface is.
     Capsule,
-    /// Each point is a cluster of small discs. Scattered points have this kind, whatever the kind of their cloud's
-    /// surface is.
+    /// Each point is a cluster of small discs. The scattered points of plants have this kind, those of other clouds are
+    /// spheres, whatever the kind of their cloud's surface is.
     Leaves,
 }
 
@@ -79,7 +79,7 @@ impl SurfaceKind {
         ("gaussian", Self::Gaussian),
     ];
 
-    /// Returns the name that `from_str` parses; that of a kind that no cloud can be given is no more than a name.
+    /// Returns the name that `from_str` parses, or one that it rejects for a kind that no cloud can be given.
     pub fn name(self) -> &'static str {
         match self {
             Self::Capsule => "capsule",

@@ -4,24 +4,36 @@ use super::disc::Disc;
 use super::shape::{PointLanes, RayLanes, Shape};
 use crate::math::{Floats, LaneMask, Vec3, Vec3Lanes, hash};
 
-/// Centres and normals, of any length, of the leaves of a cluster whose radius is 1.
-pub const LEAVES: [[[f32; 3]; 2]; 8] = [
-    [[0.78, 0.23, -0.38], [0.69, -0.68, 0.24]],
-    [[-0.65, 0.12, -0.54], [0.03, 0.89, -0.45]],
-    [[-0.57, -0.07, 0.69], [0.64, 0.75, -0.19]],
-    [[0.27, 0.75, -0.01], [-0.11, -0.52, -0.85]],
-    [[0.14, -0.81, 0.21], [-0.41, -0.72, 0.56]],
-    [[0.65, 0.25, 0.27], [0.93, -0.13, 0.33]],
-    [[0.03, 0.27, -0.36], [0.05, 0.86, 0.52]],
-    [[-0.34, -0.08, 0.01], [-0.15, 0.42, -0.89]],
+/// Centres of the leaves of a cluster whose radius is 1: chosen at random, far from each other. One leaf hides too little,
+/// and each one more takes time; eight show no shape of their own.
+pub const LEAF_CENTERS: [Vec3; 8] = [
+    Vec3::new(0.78, 0.23, -0.38),
+    Vec3::new(-0.65, 0.12, -0.54),
+    Vec3::new(-0.57, -0.07, 0.69),
+    Vec3::new(0.27, 0.75, -0.01),
+    Vec3::new(0.14, -0.81, 0.21),
+    Vec3::new(0.65, 0.25, 0.27),
+    Vec3::new(0.03, 0.27, -0.36),
+    Vec3::new(-0.34, -0.08, 0.01),
+];
+/// Their normals, of any length: chosen at random, in directions far from each other.
+pub const LEAF_NORMALS: [Vec3; 8] = [
+    Vec3::new(0.69, -0.68, 0.24),
+    Vec3::new(0.03, 0.89, -0.45),
+    Vec3::new(0.64, 0.75, -0.19),
+    Vec3::new(-0.11, -0.52, -0.85),
+    Vec3::new(-0.41, -0.72, 0.56),
+    Vec3::new(0.93, -0.13, 0.33),
+    Vec3::new(0.05, 0.86, 0.52),
+    Vec3::new(-0.15, 0.42, -0.89),
 ];
 /// Radius of a leaf in radii of its cluster.
 pub const LEAF_RADIUS: f32 = 0.5;
 /// Radius, in radii of a cluster, of the ball around its centre that contains all of its leaves.
 pub const REACH: f32 = 1.39;
 
-/// The shape of a cluster of leaves. The centres of the leaves lie within the point's radius. The cluster is mirrored at
-/// the plane of the point's normal, so that those of different points are unlike.
+/// The shape of a cluster of leaves. The centres of the leaves lie within the point's radius. The normal of the point is no
+/// normal of a surface but the [`mirror`] of the cluster, which is mirrored at its plane.
 pub struct Leaves;
 
 impl Shape for Leaves {
@@ -38,7 +50,7 @@ impl Shape for Leaves {
             let direction = mirrored(ray.direction, points.normal);
             let ray = RayLanes { direction, t_min: ray.t_min };
             let radius = points.radius * F::splat(LEAF_RADIUS);
-            for [offset, normal] in LEAVES.map(|leaf| leaf.map(Vec3::from_array)) {
+            for (offset, normal) in LEAF_CENTERS.into_iter().zip(LEAF_NORMALS) {
                 let center = center.plus(Vec3Lanes::splat(offset).scaled(points.radius));
                 let leaf = PointLanes { center, normal: Vec3Lanes::splat(normal), radius };
                 let (distance, is_hit) = Disc::intersect(&leaf, &ray);
@@ -56,12 +68,11 @@ fn mirrored<F: Floats>(vector: Vec3Lanes<F>, normal: Vec3Lanes<F>) -> Vec3Lanes<
     vector.minus(normal.scaled(height + height))
 }
 
-/// Returns the normal of the leaf at `position`, on either side of it. `mirror` is the point's normal, of unit length.
+/// Returns the normal of the leaf at `position`, on either side of it. `mirror` has unit length.
 pub fn normal(position: Vec3, center: Vec3, mirror: Vec3, radius: f32) -> Vec3 {
-    let mirrored = |vector: Vec3| vector - 2.0 * mirror.dot(vector) * mirror;
-    let at = mirrored((position - center) / radius);
+    let at = (position - center).reflect(mirror) / radius;
     let mut nearest = (f32::INFINITY, Vec3::Z);
-    for [offset, normal] in LEAVES.map(|leaf| leaf.map(Vec3::from_array)) {
+    for (offset, normal) in LEAF_CENTERS.into_iter().zip(LEAF_NORMALS) {
         let (normal, from_leaf) = (normal.normalize(), at - offset);
         // A position on a leaf is nearer to its plane than the others that it lies on by chance.
         let beyond = (from_leaf.length() - LEAF_RADIUS).max(0.0);
@@ -70,13 +81,15 @@ pub fn normal(position: Vec3, center: Vec3, mirror: Vec3, radius: f32) -> Vec3 {
             nearest = (distance, normal);
         }
     }
-    mirrored(nearest.1)
+    nearest.1.reflect(mirror)
 }
 
-/// Returns the normal, of any length, that mirrors the cluster of the point with index `id`.
-pub fn mirror(id: u32) -> Vec3 {
+/// Returns the normal, of any length, of the plane at which the cluster of a point is mirrored, so that the clusters of
+/// different points are unlike. `position` is that of the point at rest: neither clips nor deformations change the cluster.
+pub fn mirror(position: Vec3) -> Vec3 {
     const BITS: u32 = 21;
-    let bits = hash(u64::from(id));
+    let [x, y, z] = position.to_array().map(|coordinate| u64::from(coordinate.to_bits()));
+    let bits = hash(hash(x << 32 | y) ^ z);
     let component = |axis: u32| {
         let steps = bits >> (axis * BITS) & ((1 << BITS) - 1);
         steps as f32 / (1 << (BITS - 1)) as f32 - 1.0
@@ -103,12 +116,11 @@ mod tests {
 
     /// The leaves of a cluster: centres, unit normals and radius.
     fn leaves(center: Vec3, mirror: Vec3, radius: f32) -> Vec<(Vec3, Vec3, f32)> {
-        let mirrored = |vector: Vec3| vector - 2.0 * mirror.dot(vector) * mirror;
-        let leaf = |[offset, normal]: [Vec3; 2]| {
-            let normal = mirrored(normal.normalize());
-            (center + radius * mirrored(offset), normal, LEAF_RADIUS * radius)
+        let leaf = |(offset, normal): (Vec3, Vec3)| {
+            let normal = normal.normalize().reflect(mirror);
+            (center + radius * offset.reflect(mirror), normal, LEAF_RADIUS * radius)
         };
-        LEAVES.map(|parts| leaf(parts.map(Vec3::from_array))).to_vec()
+        LEAF_CENTERS.into_iter().zip(LEAF_NORMALS).map(leaf).collect()
     }
 
     #[test]
@@ -183,9 +195,9 @@ mod tests {
 
     #[test]
     fn mirrors_differ_from_point_to_point() {
-        let mean: Vec3 = (0..1000).map(|id| mirror(id).normalize()).sum::<Vec3>() / 1000.0;
+        let mirror = |i: u32| mirror(Vec3::new(0.01 * i as f32, 5.0, -1.0)).normalize();
+        let mean: Vec3 = (0..1000).map(mirror).sum::<Vec3>() / 1000.0;
         assert!(mean.length() < 0.1, "{mean}");
-        let distance = |id: u32| mirror(id).normalize().distance(mirror(id + 1).normalize());
-        assert!((0..1000).all(|id| 1e-3 < distance(id)));
+        assert!((0..1000).all(|i| 1e-3 < mirror(i).distance(mirror(i + 1))));
     }
 }

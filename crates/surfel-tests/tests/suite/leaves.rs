@@ -1,10 +1,11 @@
-//! Scattered points as clusters of leaves: fast searches against brute force, in packets and alone.
+//! Scattered points as clusters of leaves: fast searches against brute force, in packets and as single rays.
 
-use surfel_core::flat::FlatCloud;
-use surfel_core::math::{LaneMask, Lanes, PortableLanes, Random, Ray, Vec3};
+use std::collections::BTreeMap;
+use surfel_core::flat::{FlatCloud, FlatPoints};
+use surfel_core::math::{DAffine3, DVec3, LaneMask, Lanes, PortableLanes, Random, Ray, Vec3};
 use surfel_core::points::Structure;
 use surfel_core::progress::NoProgress;
-use surfel_core::scene::CloudGeometry;
+use surfel_core::scene::{Clip, ClipPlane, CloudGeometry};
 use surfel_core::surface::{Leaves, RayLanes, Shape, SurfaceKind};
 use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
 use surfel_tests::clouds;
@@ -58,7 +59,9 @@ fn all_searches_find_the_nearest_leaf_before_the_ground() {
     let mut anywhere = || Vec3::from_array(std::array::from_fn(|_| 4.0 * random.next_f32() - 2.0));
     let scattered = (0..2000).map(|i| {
         let origin = anywhere();
-        Ray::new(origin, (target(7 * i) - origin).normalize_or(Vec3::Z))
+        let ray = Ray::new(origin, (target(7 * i) - origin).normalize_or(Vec3::Z));
+        let t_min = 0.01 * (i % 50) as f32;
+        Ray { t_min, t_max: if i % 3 == 0 { t_min + 1.0 } else { f32::INFINITY }, ..ray }
     });
     let rays: Vec<Ray> = from_eye.chain(scattered).collect();
     let ground = {
@@ -86,10 +89,30 @@ fn all_searches_find_the_nearest_leaf_before_the_ground() {
                     assert!(hit.normal.dot(rays[i].direction) <= 0.0 && !hit.is_backface);
                     assert!(occluded[i], "{name} {i}");
                 }
-                None => assert_eq!(hit.distance, ground[i].distance, "{name} {i}"),
+                None => {
+                    assert_eq!(hit.distance, ground[i].distance, "{name} {i}");
+                    assert!(occluded[i] != ground[i].is_miss(), "{name} {i}");
+                }
             }
         }
         assert!(2000 < n_leaves, "{n_leaves}");
+    }
+}
+
+#[test]
+fn clusters_stay_the_same_where_others_are_clipped() {
+    let normals = |points: &FlatPoints| -> BTreeMap<u32, Vec3> {
+        points.slots().map(|slot| (points.id(slot), points.normal(slot))).collect()
+    };
+    let mut tree = tree();
+    let whole = normals(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
+    let plane = ClipPlane { point: 0.9 * DVec3::Z, normal: -DVec3::Z };
+    let clip = Clip { plane: Some(plane), ..Clip::default() };
+    let kept = tree.clip(&clip, &DAffine3::IDENTITY).unwrap();
+    let part = normals(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
+    assert!(300 < part.len() && part.len() == kept.len(), "{} {}", part.len(), kept.len());
+    for (id, normal) in part {
+        assert_eq!(normal, whole[&kept[id as usize]]);
     }
 }
 

@@ -179,28 +179,44 @@ impl RegionNoise {
     }
 }
 
-/// Returns as many neighbours of a position as a noise in spacings asks for, as [`nearest`] does.
-pub fn neighbors_by_noise(
-    points: &KdTree,
-    groups: &KdTree,
-    position: Vec3,
-    noise: f32,
-) -> Option<(Vec<Neighbor>, usize)> {
-    let k = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
-    nearest(points, groups, position, k.clamp(MIN_NOISE_NEIGHBORS, MAX_NOISE_NEIGHBORS))
+/// The points nearest to a position, or the groups that stand for them.
+pub struct NearestPoints<'a> {
+    /// The points, or the means of groups, among which the neighbours are.
+    pub positions: &'a [Vec3],
+    /// Nearest first.
+    pub neighbors: Vec<Neighbor>,
+    /// Number of points that each neighbour stands for.
+    pub group_size: usize,
 }
 
-/// Returns the `k` nearest points to a position, or the groups that stand for them if they are many, and the number of points
-/// that each stands for; `None` if there are fewer.
-fn nearest(
-    points: &KdTree,
-    groups: &KdTree,
-    position: Vec3,
-    k: usize,
-) -> Option<(Vec<Neighbor>, usize)> {
-    let (tree, size) = if MAX_UNGROUPED < k { (groups, GROUP_SIZE) } else { (points, 1) };
-    let neighbors = tree.nearest(position, k / size, None);
-    (neighbors.len() == k / size).then_some((neighbors, size))
+impl<'a> NearestPoints<'a> {
+    /// Finds the `k` nearest points, as groups if they are many; `None` if there are fewer.
+    fn new(points: &'a KdTree, groups: &'a KdTree, position: Vec3, k: usize) -> Option<Self> {
+        let (tree, group_size) = match MAX_UNGROUPED < k {
+            true => (groups, GROUP_SIZE),
+            false => (points, 1),
+        };
+        let neighbors = tree.nearest(position, k / group_size, None);
+        let is_complete = neighbors.len() == k / group_size;
+        is_complete.then_some(Self { positions: tree.positions(), neighbors, group_size })
+    }
+
+    /// Finds as many as a noise in spacings asks for.
+    pub fn by_noise(
+        points: &'a KdTree,
+        groups: &'a KdTree,
+        position: Vec3,
+        noise: f32,
+    ) -> Option<Self> {
+        let k = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
+        Self::new(points, groups, position, k.clamp(MIN_NOISE_NEIGHBORS, MAX_NOISE_NEIGHBORS))
+    }
+
+    /// Returns the plane through them; `None` if there are none.
+    pub fn plane(&self) -> Option<PlaneFit> {
+        let [nearest, others @ ..] = &self.neighbors[..] else { return None };
+        Some(fit_plane(self.positions, nearest.index as usize, others))
+    }
 }
 
 /// Returns the distance from a point to the last of [`MIN_NOISE_NEIGHBORS`].
@@ -214,13 +230,13 @@ fn reach_at(tree: &KdTree, point: u32) -> f32 {
 /// is on no other surface.
 fn is_noisier(tree: &KdTree, point: usize, noise: f32) -> bool {
     let positions = tree.positions();
-    let nearest = |n_nearest| tree.nearest(positions[point], n_nearest, Some(point as u32));
-    let few = nearest(MIN_NOISE_NEIGHBORS);
+    let neighbors = |count| tree.nearest(positions[point], count, Some(point as u32));
+    let few = neighbors(MIN_NOISE_NEIGHBORS);
     if fit_plane(positions, point, &few).variation < MAX_PLANE_VARIATION {
         return false;
     }
     let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
-    let neighbors = nearest(n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED));
+    let neighbors = neighbors(n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED));
     let fit = fit_plane(positions, point, &neighbors);
     fit.variation < MAX_BENT_VARIATION && thins_out(positions, point, &neighbors, fit.normal)
 }
@@ -327,12 +343,10 @@ impl NoiseAtPoint {
         let (mut last_variation, mut has_fallen, mut has_risen) = (f32::INFINITY, false, false);
         let mut k = MIN_NOISE_NEIGHBORS;
         while k <= MAX_NOISE_NEIGHBORS {
-            let Some((neighbors, size)) = nearest(points, groups, center, k) else {
+            let nearest = NearestPoints::new(points, groups, center, k);
+            let Some(fit) = nearest.and_then(|nearest| nearest.plane()) else {
                 return Self::Bent;
             };
-            let positions = if size == 1 { points.positions() } else { groups.positions() };
-            let [nearest, others @ ..] = &neighbors[..] else { return Self::Bent };
-            let fit = fit_plane(positions, nearest.index as usize, others);
             if fit.normal == Vec3::ZERO {
                 return Self::Bent;
             }

@@ -1,6 +1,6 @@
 //! Plants: their points look like noise of a surface, but are none, and stay where they are.
 
-use super::noise::neighbors_by_noise;
+use super::noise::NearestPoints;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -28,17 +28,17 @@ const N_NEIGHBORS: usize = 24;
 const MIN_ROUGH_FRACTION: f32 = 0.75;
 /// Minimum fraction of the points in crowns: fewer are on ears, claws and other small parts of a surface.
 const MIN_IN_CROWNS: f32 = 0.05;
-/// Minimum on land.
+/// Minimum fraction of the points in crowns on land.
 const MIN_IN_CROWNS_ON_LAND: f32 = 0.01;
 /// Number of rough points near each other that are in a crown together, or in the noise of a surface.
 const RUN_SIZE: usize = 128;
-/// Number of these that vote.
+/// Number of points of such a run that vote on it.
 const N_VOTERS: usize = 3;
 /// Noise of a surface, in that of its region, that is tried in turn.
 const NOISE_RATIOS: [f32; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 /// Greatest surface variation of noise among as many neighbours as it asks for.
 const MAX_NOISE_VARIATION: f32 = 0.08;
-/// Minimum number of rough points whose heights tell noise.
+/// Minimum number of points in crowns near a plane that tell noise by their heights.
 const MIN_HEIGHTS: usize = 8;
 /// Minimum fraction of them on either side of the plane of the neighbours: a crown is above the ground.
 const MIN_ON_SIDE: f32 = 0.15;
@@ -169,33 +169,32 @@ struct NoisyPlane {
 
 /// Returns the plane through as many neighbours of a point as a noise in spacings asks for; `None` if they lie in no plane.
 fn noisy_plane(tree: &KdTree, groups: &KdTree, point: usize, noise: f32) -> Option<NoisyPlane> {
-    let position = tree.positions()[point];
-    let (neighbors, size) = neighbors_by_noise(tree, groups, position, noise)?;
-    let positions = if size == 1 { tree.positions() } else { groups.positions() };
-    let [nearest, others @ ..] = &neighbors[..] else { return None };
-    let PlaneFit { normal, variation, .. } = fit_plane(positions, nearest.index as usize, others);
+    let nearest = NearestPoints::by_noise(tree, groups, tree.positions()[point], noise)?;
+    let PlaneFit { normal, variation, .. } = nearest.plane()?;
     if MAX_NOISE_VARIATION < variation {
         return None;
     }
+    let NearestPoints { positions, neighbors, group_size } = nearest;
     let sum: Vec3 = neighbors.iter().map(|other| positions[other.index as usize]).sum();
     let center = sum / neighbors.len() as f32;
+    let n_points = tree.positions().len();
     let height = |other: &Neighbor| {
         let index = other.index as usize;
-        let points = size * index..tree.positions().len().min(size * (index + 1));
+        let points = group_size * index..n_points.min(group_size * (index + 1));
         (points, normal.dot(positions[index] - center))
     };
     Some(NoisyPlane { normal, heights: neighbors.iter().map(height).collect() })
 }
 
 impl NoisyPlane {
-    /// True if those of the points that are rough are on both sides of the plane.
-    fn has_points_on_both_sides(&self, is_rough: impl Fn(usize) -> bool) -> bool {
-        let rough = self.heights.iter().filter(|(points, _)| points.clone().any(&is_rough));
-        let (n_rough, n_above) = rough.fold((0usize, 0usize), |(n_rough, n_above), (_, height)| {
-            (n_rough + 1, n_above + usize::from(0.0 < *height))
+    /// True if those of the points that are in crowns are on both sides of the plane.
+    fn has_points_on_both_sides(&self, is_in_crown: impl Fn(usize) -> bool) -> bool {
+        let found = self.heights.iter().filter(|(points, _)| points.clone().any(&is_in_crown));
+        let (n_found, n_above) = found.fold((0usize, 0usize), |(n_found, n_above), (_, height)| {
+            (n_found + 1, n_above + usize::from(0.0 < *height))
         });
-        let min_on_side = MIN_ON_SIDE * n_rough as f32;
-        MIN_HEIGHTS <= n_rough && min_on_side <= n_above.min(n_rough - n_above) as f32
+        let min_on_side = MIN_ON_SIDE * n_found as f32;
+        MIN_HEIGHTS <= n_found && min_on_side <= n_above.min(n_found - n_above) as f32
     }
 }
 

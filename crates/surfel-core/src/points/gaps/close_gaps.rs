@@ -24,8 +24,9 @@ const MIN_EMPTY: usize = 3;
 const N_CANDIDATES: usize = 16;
 /// Maximum width of a gap, in radii of the disc from which it is seen.
 const MAX_WIDTH: f32 = 1.5;
-/// Number of candidates and greatest width on land under trees, where the points beyond wide gaps are sought among more.
+/// Number of points among which the other side is sought on land under trees, where gaps are wide.
 const N_CANDIDATES_UNDER_TREES: usize = 64;
+/// Maximum width of a gap in land under trees, in radii of the disc from which it is seen.
 const MAX_WIDTH_UNDER_TREES: f32 = 3.0;
 /// Minimum cosine between the normal of such land and that of a disc on it.
 const MIN_LAND_COSINE: f32 = 0.8;
@@ -170,7 +171,7 @@ impl Octaves {
     }
 
     /// Returns the sides near a position, up to `n_candidates` of each octave, nearest first; the one at the position is among
-    /// them. The index of each is its place among all sides.
+    /// them. The index of each is its index among all sides.
     fn nearest(
         &self,
         trees: &[KdTree],

@@ -17,7 +17,7 @@ use super::solids::{apply_structure, ball_radius, clamp_solids, second_distance}
 use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
-use super::vegetation::{is_vegetated, land_normal};
+use super::vegetation::{count_rough, is_vegetated, land_normal};
 use super::wall_faces::join_faces;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
@@ -84,7 +84,7 @@ pub fn find_structures(
     let mut shapes: Vec<PointShape> = decided.into_iter().map(|decision| decision.shape).collect();
     join_faces(tree, &mut shapes, progress)?;
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
-    let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
+    let n_rough = count_rough(fits);
     let widened = match rings {
         Some((rings, scanner)) => {
             close_ring_gaps(tree, rings, scanner, &mut shapes, progress)?;

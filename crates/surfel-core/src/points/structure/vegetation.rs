@@ -1,9 +1,11 @@
 //! Vegetation in clouds, and the land under it.
 
-use super::point_shape::{PointShape, Structure};
+use super::point_shape::{PointShape, Structure, is_line, is_surface};
 use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
 use crate::points::PointCloud;
+use crate::points::normals::planes::PlaneFit;
 use crate::points::up::is_mostly_land;
+use rayon::prelude::*;
 
 /// Minimum fraction of scattered points in a cloud with much vegetation.
 pub const MIN_VEGETATION: f32 = 0.2;
@@ -14,29 +16,38 @@ const MIN_LEAVES: usize = 10_000;
 /// ASPRS classes of low, medium and high vegetation.
 const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 
-/// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those on land,
-/// those that the file calls vegetation, and those of clouds with much of them. If all points are scattered, each stands for
-/// itself.
+/// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
+/// file calls vegetation, those on land, and those of clouds with much of them. Without such classes the points of a cloud
+/// that are all scattered stand for themselves.
 pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
-    let is_scattered = |structure: &&Structure| **structure == Structure::Scatter;
-    let n_scattered = structures.iter().filter(is_scattered).count();
-    if n_scattered == structures.len() {
-        return false;
+    let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
+    let n_scattered = structures.iter().filter(|structure| is_scattered(structure)).count();
+    let n_plants = cloud.classification.as_deref().map_or(0, |classes| {
+        let classes = classes.iter().zip(structures).filter(|(_, own)| is_scattered(own));
+        classes.filter(|(class, _)| VEGETATION_CLASSES.contains(class)).count()
+    });
+    if 0 < n_plants && is_much(n_plants, n_scattered) {
+        return true;
     }
-    let is_plant = |class: &u8| VEGETATION_CLASSES.contains(class);
-    MIN_LEAVES.max((MIN_VEGETATION * structures.len() as f32) as usize) <= n_scattered
-        || cloud.classification.as_deref().is_some_and(|classes| classes.iter().any(is_plant))
-        || is_mostly_land(&cloud.positions)
+    n_scattered < structures.len()
+        && (MIN_LEAVES <= n_scattered && is_much(n_scattered, structures.len())
+            || is_mostly_land(&cloud.positions))
+}
+
+/// Returns the number of points whose nearest neighbours lie in no plane and on no line.
+pub fn count_rough(fits: &[PlaneFit]) -> usize {
+    fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count()
+}
+
+/// True if a number of points is much of a cloud.
+fn is_much(n_plants: usize, n_points: usize) -> bool {
+    MIN_VEGETATION * n_points as f32 <= n_plants as f32
 }
 
 /// Returns true if much of the cloud is vegetation: many points are scattered, and not by noise.
 pub fn is_vegetated(shapes: &[PointShape], n_rough: usize) -> bool {
-    !is_noisy(count_scattered(shapes), n_rough) && has_many_scattered(shapes)
-}
-
-/// Returns true if much of a cloud is scattered.
-pub fn has_many_scattered(shapes: &[PointShape]) -> bool {
-    MIN_VEGETATION * shapes.len() as f32 <= count_scattered(shapes) as f32
+    let n_scattered = count_scattered(shapes);
+    !is_noisy(n_scattered, n_rough) && is_much(n_scattered, shapes.len())
 }
 
 /// Returns true if most of the points whose nearest neighbours lie in no plane are not scattered: the cloud is noisy rather
@@ -95,10 +106,19 @@ mod tests {
 
     #[test]
     fn what_a_file_calls_vegetation_is_leaves() {
-        let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
-        for (class, expected) in [(2, false), (3, true), (5, true), (6, false)] {
-            cloud.classification = Some([vec![1; 99], vec![class]].concat());
-            assert_eq!(has_leaves(&cloud, &structures), expected, "{class}");
+        for n_scattered in [50, 100] {
+            let (mut cloud, structures) = cloud(100, n_scattered, Vec3::ONE);
+            for (class, expected) in [(2, false), (3, true), (5, true), (6, false)] {
+                cloud.classification = Some([vec![class; 20], vec![1; 80]].concat());
+                assert_eq!(has_leaves(&cloud, &structures), expected, "{class}");
+            }
         }
+    }
+
+    #[test]
+    fn vegetation_elsewhere_makes_no_leaves() {
+        let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
+        cloud.classification = Some([vec![6; 49], vec![5; 51]].concat());
+        assert!(!has_leaves(&cloud, &structures));
     }
 }

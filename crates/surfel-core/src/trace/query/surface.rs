@@ -187,7 +187,7 @@ fn nearest_occlusions(rays: &[Ray], occluded: &mut [bool], trace: impl FnOnce(&m
     occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.is_miss());
 }
 
-/// Replaces hits by nearer ones on the spheres or capsules of `points`.
+/// Replaces hits by nearer ones on the spheres, capsules or leaves of `points`.
 #[inline(always)]
 fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
     points: &FlatPoints,
@@ -228,7 +228,7 @@ fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
     }
 }
 
-/// Marks the rays that the spheres or capsules of `points` occlude.
+/// Marks the rays that the spheres, capsules or leaves of `points` occlude.
 #[inline(always)]
 fn merge_occlusions<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
     points: &FlatPoints,

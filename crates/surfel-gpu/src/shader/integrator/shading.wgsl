@@ -36,7 +36,8 @@ fn shading_at(ray: Ray, hit: HitRecord) -> Shading {
         material.roughness,
         material.ior,
         material.transmission,
-        material.is_thin == 1u,
+        // A leaf has no inside.
+        material.is_thin == 1u || hit.surface == LEAVES,
         material.emissive,
         material.is_unlit == 1u,
         0.0,
