@@ -135,7 +135,10 @@ test('beyond loopback a token is required', async () => {
   await page.locator('#banner', { hasText: 'no connection to the server (token: missing or wrong' }).waitFor();
   assert.equal(await state(page, 'lastFrame'), null);
   await page.context().close();
-  const picture = await fetch(`${address}render?resolution=20x10&token=${token}`);
+  const render = () => fetch(`${address}render?resolution=20x10&token=${token}`);
+  let picture = await render();
+  // The files may still be loading.
+  while (picture.status === 503) picture = await render();
   assert.equal(picture.headers.get('content-type'), 'image/png');
 });
 

@@ -19,6 +19,7 @@ use super::scan::scan_rings::ScanRings;
 use super::select_points::{Selection, select};
 use super::structure::elevation_grid::elevation_grid;
 use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure::vegetation::has_leaves;
 use super::{PointCloud, PreparedCloud};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -137,7 +138,8 @@ pub fn prepare(
     }
     if let Some((shapes, found)) = shapes {
         add_structures(&mut cloud, &shapes);
-        report.structure = Some(found);
+        let has_leaves = cloud.structures().is_some_and(|all| has_leaves(&cloud, &all));
+        report.structure = Some(StructureReport { has_leaves, ..found });
     }
     add_morph_offsets(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))

@@ -79,6 +79,8 @@ pub struct StructureReport {
     pub n_lines: usize,
     /// Number of points that stand for themselves.
     pub n_scatter: usize,
+    /// True if these are shown as leaves; false if each is a ball.
+    pub has_leaves: bool,
     /// Number of points of surfaces that are left out, as others cover them.
     pub n_redundant: usize,
 }
@@ -90,17 +92,23 @@ impl StructureReport {
             n_surface: count(Structure::Surface),
             n_lines: count(Structure::Line),
             n_scatter: count(Structure::Scatter),
+            has_leaves: false,
             n_redundant: count(Structure::Redundant),
         }
     }
 
     /// Returns a line about the structures for the user.
     pub fn line(&self) -> String {
-        let Self { n_surface, n_lines, n_scatter, n_redundant } = *self;
+        let Self { n_surface, n_lines, n_scatter, n_redundant, has_leaves } = *self;
         let n_points = (n_surface + n_lines + n_scatter + n_redundant).max(1);
         let percent = |count: usize| 100.0 * count as f64 / n_points as f64;
+        let shown = match (n_scatter, has_leaves) {
+            (0, _) => "",
+            (_, true) => ", shown as leaves",
+            (_, false) => ", shown as balls",
+        };
         let line = format!(
-            "structure: {:.1} % surface, {:.1} % lines, {:.1} % scattered points",
+            "structure: {:.1} % surface, {:.1} % lines, {:.1} % scattered points{shown}",
             percent(n_surface + n_redundant),
             percent(n_lines),
             percent(n_scatter)
@@ -174,9 +182,20 @@ pub(crate) fn is_line(fit: &PlaneFit) -> bool {
 
 #[cfg(test)]
 mod tests {
-    //! Names of choices.
+    //! Names of choices, and the line of a report.
 
     use super::*;
+
+    #[test]
+    fn the_line_says_what_scattered_points_are_shown_as() {
+        let report = StructureReport { n_surface: 3, n_scatter: 1, ..StructureReport::default() };
+        let line = "structure: 75.0 % surface, 0.0 % lines, 25.0 % scattered points, shown as";
+        assert_eq!(report.line(), format!("{line} balls"));
+        let leafy = StructureReport { has_leaves: true, ..report };
+        assert_eq!(leafy.line(), format!("{line} leaves"));
+        let plain = StructureReport { n_scatter: 0, ..leafy };
+        assert!(plain.line().ends_with("0.0 % scattered points"), "{}", plain.line());
+    }
 
     #[test]
     fn choices_are_parsed() {
