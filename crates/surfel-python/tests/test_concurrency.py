@@ -121,6 +121,12 @@ def test_progress_is_reported(hill):
         assert isinstance(stage, str) and stage and 0 <= done and isinstance(total, int)
 
 
+def test_frames_of_a_movie_report_progress(hill):
+    movie, stages = surfel.Movie(surfel.load(hill), frames=2, turntable=1, resolution=(640, 480)), []
+    movie.render(1, progress=lambda stage, done, total: stages.append(stage))
+    assert "render" in stages
+
+
 def test_what_a_callback_raises_stops_the_work(hill):
     def refuse(stage, done, total):
         raise RuntimeError("enough")
@@ -164,10 +170,21 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
-    movie = surfel.Movie(surfel.load(hill), frames=2, turntable=1, threads=1, resolution=(320, 240), spp=16, light_samples=16)
-    rendering = threading.Thread(target=lambda: movie.render(0))
+    movie = surfel.Movie(surfel.load(hill), frames=2, turntable=1, **LONG)
+    has_begun, may_end = threading.Event(), threading.Event()
+
+    def hold(stage, done, total):
+        has_begun.set()
+        may_end.wait()
+        raise InterruptedError
+
+    def render():
+        with pytest.raises(InterruptedError):
+            movie.render(0, progress=hold)
+
+    rendering = threading.Thread(target=render)
     rendering.start()
-    time.sleep(0.2)
+    assert has_begun.wait(60)
     # Programs that a shell has put in the background ignore the signal.
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -177,6 +194,7 @@ def test_ctrl_c_stops_waiting_for_a_frame_of_another_thread(hill):
         assert rendering.is_alive()
     finally:
         signal.signal(signal.SIGINT, previous)
+        may_end.set()
         rendering.join()
 
 

@@ -147,7 +147,8 @@ impl PlannedMovie {
     /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
     pub fn render(self, output: &Path, resumes: bool, progress: &dyn Progress) -> Result<()> {
         let BuiltMovie { mut scene, options } = self.build(progress)?;
-        let frame = |time_secs: f64| frame_at(&mut scene, time_secs, progress);
+        let quiet = CancelOnly(progress);
+        let frame = |time_secs: f64| frame_at(&mut scene, time_secs, &quiet);
         write_movie(output, &options, resumes, progress, frame)
     }
 
@@ -289,10 +290,9 @@ fn frame_at(
     time_secs: f64,
     progress: &dyn Progress,
 ) -> Result<RenderedImage> {
-    let quiet = CancelOnly(progress);
     scene.fix_overlay();
-    seek(scene, time_secs, &quiet)?;
-    Ok(scene.render_with(&quiet)?.0)
+    seek(scene, time_secs, progress)?;
+    Ok(scene.render_with(progress)?.0)
 }
 
 /// Moves everything to a time in seconds, and turns it if the description has a turntable.
