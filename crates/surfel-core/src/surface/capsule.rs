@@ -68,17 +68,8 @@ mod tests {
     //! Rays against capsules of known place.
 
     use super::*;
-    use crate::math::{Random, Ray, Vec3Lanes};
-
-    fn hit(center: Vec3, direction: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
-        let points = PointLanes {
-            center: Vec3Lanes::splat(center - ray.origin),
-            normal: Vec3Lanes::splat(direction),
-            radius,
-        };
-        let (distance, is_hit) = Capsule::intersect::<f32>(&points, &RayLanes::new(ray));
-        is_hit.then_some(distance)
-    }
+    use crate::math::{Random, Ray};
+    use crate::surface::shape::hit;
 
     #[test]
     fn hits_lie_at_the_thickness_from_the_line() {
@@ -89,7 +80,7 @@ mod tests {
                 || Vec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f32() - 1.0));
             let (origin, target, direction) = (6.0 * vector(), vector(), vector().normalize());
             let ray = Ray::new(origin, (target - origin).normalize());
-            let Some(distance) = hit(Vec3::ZERO, direction, 1.0, &ray) else { continue };
+            let Some(distance) = hit::<Capsule>(Vec3::ZERO, direction, 1.0, &ray) else { continue };
             n_hits += 1;
             let position = ray.at(distance);
             let outward = normal(position, Vec3::ZERO, direction, 1.0);
@@ -105,8 +96,8 @@ mod tests {
     fn rays_along_the_axis_meet_the_near_cap() {
         let ray = Ray::new(Vec3::new(0.0, 0.1, -5.0), Vec3::Z);
         let expected = 5.0 - 0.75 - (0.25f32 * 0.25 - 0.01).sqrt();
-        assert!((hit(Vec3::ZERO, Vec3::Z, 1.0, &ray).unwrap() - expected).abs() < 1e-4);
+        assert!((hit::<Capsule>(Vec3::ZERO, Vec3::Z, 1.0, &ray).unwrap() - expected).abs() < 1e-4);
         let miss = Ray::new(Vec3::new(0.0, 0.3, -5.0), Vec3::Z);
-        assert_eq!(hit(Vec3::ZERO, Vec3::Z, 1.0, &miss), None);
+        assert_eq!(hit::<Capsule>(Vec3::ZERO, Vec3::Z, 1.0, &miss), None);
     }
 }

@@ -202,17 +202,9 @@ mod tests {
     //! Rays that begin on shapes.
 
     use super::*;
-    use crate::math::{Random, Vec3Lanes};
-    use crate::surface::shape::{PointLanes, RayLanes, Shape};
+    use crate::math::Random;
+    use crate::surface::shape::hit;
     use crate::surface::sphere::Sphere;
-
-    fn hit_of_sphere(center: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
-        let (center, normal) =
-            (Vec3Lanes::splat(center - ray.origin), Vec3Lanes::splat(Vec3::ZERO));
-        let points = PointLanes { center, normal, radius };
-        let (distance, is_hit) = Sphere::intersect::<f32>(&points, &RayLanes::new(ray));
-        is_hit.then_some(distance)
-    }
 
     #[test]
     fn small_spheres_seen_from_afar_do_not_shade_themselves() {
@@ -226,7 +218,9 @@ mod tests {
                 let origin = center + distance * from;
                 let target = center + 0.9 * radius * vector();
                 let ray = Ray::new(origin, (target - origin).normalize());
-                let Some(distance) = hit_of_sphere(center, radius, &ray) else { continue };
+                let Some(distance) = hit::<Sphere>(center, Vec3::ZERO, radius, &ray) else {
+                    continue;
+                };
                 n_hits += 1;
                 let position = ray.at(distance);
                 let normal = (position - center).normalize();
@@ -234,7 +228,11 @@ mod tests {
                 let magnitude = position.abs().max(origin.abs()).max_element();
                 let to_sun =
                     SurfaceKind::Sphere.spawn_ray(position, magnitude, normal, radius, sun);
-                assert_eq!(hit_of_sphere(center, radius, &to_sun), None, "{radius} {distance}");
+                assert_eq!(
+                    hit::<Sphere>(center, Vec3::ZERO, radius, &to_sun),
+                    None,
+                    "{radius} {distance}"
+                );
             }
             assert!(1000 < n_hits, "{n_hits}");
         }

@@ -103,16 +103,7 @@ mod tests {
 
     use super::*;
     use crate::math::{Basis, Random, Ray};
-
-    fn hit(center: Vec3, mirror: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
-        let points = PointLanes {
-            center: Vec3Lanes::splat(center - ray.origin),
-            normal: Vec3Lanes::splat(mirror),
-            radius,
-        };
-        let (distance, is_hit) = Leaves::intersect::<f32>(&points, &RayLanes::new(ray));
-        is_hit.then_some(distance)
-    }
+    use crate::surface::shape::hit;
 
     /// The leaves of a cluster: centres, unit normals and radius.
     fn leaves(center: Vec3, mirror: Vec3, radius: f32) -> Vec<(Vec3, Vec3, f32)> {
@@ -147,7 +138,7 @@ mod tests {
                 |leaf: &&(Vec3, Vec3, f32)| 0.0 <= pierced(leaf).0 && pierced(leaf).1 < 1.0;
             let hits = leaves.iter().filter(is_hit);
             let nearest = hits.min_by(|a, b| pierced(a).0.total_cmp(&pierced(b).0));
-            let found = hit(center, 300.0 * mirror, radius, &ray);
+            let found = hit::<Leaves>(center, 300.0 * mirror, radius, &ray);
             assert_eq!(found.is_some(), nearest.is_some(), "{found:?} {nearest:?}");
             if let (Some(found), Some(nearest)) = (found, nearest) {
                 n_hits += 1;
@@ -186,8 +177,9 @@ mod tests {
             let across = REACH * vector();
             let origin = across.x * tangent + across.y * bitangent - 3.0 * direction;
             n_rays += 1;
-            n_hits +=
-                usize::from(hit(Vec3::ZERO, mirror, 1.0, &Ray::new(origin, direction)).is_some());
+            n_hits += usize::from(
+                hit::<Leaves>(Vec3::ZERO, mirror, 1.0, &Ray::new(origin, direction)).is_some(),
+            );
         }
         let area = n_hits as f32 / n_rays as f32 * (2.0 * REACH).powi(2) / std::f32::consts::PI;
         assert!((0.6..0.75).contains(&area), "{area}");

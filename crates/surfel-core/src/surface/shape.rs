@@ -1,5 +1,7 @@
 //! The interface between kernels and the shape of a single point.
 
+#[cfg(test)]
+use crate::math::Vec3;
 use crate::math::{Floats, Ray, Vec3Lanes};
 
 /// The largest absolute component of every stored point normal. Stored normals have integer components and
@@ -37,4 +39,13 @@ impl<F: Floats> RayLanes<F> {
 pub trait Shape {
     /// Returns the hit distance in each lane, at least `t_min`, and the mask of the lanes that are hit.
     fn intersect<F: Floats>(points: &PointLanes<F>, ray: &RayLanes<F>) -> (F, F::Mask);
+}
+
+/// Returns the distance at which a ray hits the shape of one point.
+#[cfg(test)]
+pub(super) fn hit<S: Shape>(center: Vec3, normal: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
+    let center = Vec3Lanes::splat(center - ray.origin);
+    let points = PointLanes { center, normal: Vec3Lanes::splat(normal), radius };
+    let (distance, is_hit) = S::intersect::<f32>(&points, &RayLanes::new(ray));
+    is_hit.then_some(distance)
 }

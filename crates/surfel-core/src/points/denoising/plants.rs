@@ -34,15 +34,15 @@ const MIN_IN_CROWNS_ON_LAND: f32 = 0.01;
 const RUN_SIZE: usize = 128;
 /// Number of points of such a run that vote on it.
 const N_VOTERS: usize = 3;
-/// Noise of a surface, in that of its region, that is tried in turn.
+/// Ratios of the noise of a surface to that of its region, which are tried in turn.
 const NOISE_RATIOS: [f32; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
-/// Greatest surface variation of noise among as many neighbours as it asks for.
+/// Maximum surface variation of as many neighbours as the noise of a surface asks for.
 const MAX_NOISE_VARIATION: f32 = 0.08;
 /// Minimum number of points in crowns near a plane that tell noise by their heights.
 const MIN_HEIGHTS: usize = 8;
 /// Minimum fraction of them on either side of the plane of the neighbours: a crown is above the ground.
 const MIN_ON_SIDE: f32 = 0.15;
-/// Greatest vertical component of the normal of a noisy surface on land, where crowns side by side are as level as the ground.
+/// Maximum vertical component of the normal of a noisy surface on land, where crowns side by side are as level as the ground.
 const MAX_LEVEL: f32 = 0.7;
 /// Heights above land by noise alone, in multiples of it: planes through few noisy points err as much as the points do.
 const SLACK: f32 = 2.0;
