@@ -67,7 +67,8 @@ test('a link of a megabyte of annotations', async () => {
   await page.locator('[aria-label="Delete all"]').click();
   assert.equal(await count(), 0);
   await settled(page);
-  await page.waitForFunction((before) => location.hash !== before, hash);
+  // The address already differs from the link once the server has completed its settings.
+  await page.waitForFunction(() => location.hash.length < 10_000);
   const { patch, measurements } = decodeHash(new URL(page.url()).hash);
   assert.deepEqual([patch.color, measurements], ['elevation', null]);
 });

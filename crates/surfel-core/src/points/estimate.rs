@@ -200,7 +200,7 @@ pub fn find_shapes<'a>(
     // Those between rings are closed already.
     if !is_by_gap.is_empty() && rings.is_none() {
         let is_wooded = is_vegetated(&shapes, count_rough(fits_of_points));
-        let land = is_wooded.then(|| land_normal(&shapes));
+        let land = is_wooded.then(|| land_normal(&cloud.positions, &shapes));
         close_gaps(&tree, radii, is_by_gap, &free_space, land, &mut shapes, progress)?;
     }
     if is_land {

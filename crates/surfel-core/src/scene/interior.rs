@@ -15,8 +15,8 @@ const WALL_RANGE: f32 = 0.3;
 const N_CELLS: usize = 10;
 /// Minimum fraction of the cells of a wall, floor or ceiling that contain points.
 const MIN_COVERAGE: f64 = 0.5;
-/// Minimum fraction of the points that lie on the walls, the floor and the ceiling. The points of a forest fill a box as
-/// well, but few lie at its sides.
+/// Minimum fraction of the points above the floor that lie on the walls and the ceiling. The trees of a forest fill a box as
+/// well, but few of their points lie at its sides.
 const MIN_ON_SIDES: f64 = 0.5;
 /// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
 /// houses that were scanned from outside have none.
@@ -154,13 +154,16 @@ impl Room {
     fn enclosure(&self, points: &[Vec3]) -> Enclosure {
         let mut is_covered = [[[false; N_CELLS * N_CELLS]; 2]; 3];
         let thickness = self.wall_thickness();
-        let mut n_on_sides = 0;
+        let (mut n_above_floor, mut n_on_sides) = (0usize, 0usize);
         for point in points {
             let local = self.local(*point);
             let is_at = |axis: usize, side: f32| (local[axis] - side).abs() < thickness[axis];
             let is_on_side =
                 |axis: usize| is_at(axis, self.low[axis]) || is_at(axis, self.high[axis]);
-            n_on_sides += usize::from((0..3).any(is_on_side));
+            if self.low[2] + thickness[2] <= local[2] {
+                n_above_floor += 1;
+                n_on_sides += usize::from((0..3).any(is_on_side));
+            }
             let cell = |axis: usize| {
                 let along = (local[axis] - self.low[axis]) / self.size(axis).max(f32::MIN_POSITIVE);
                 (0.0..1.0).contains(&along).then_some((N_CELLS as f32 * along) as usize)
@@ -182,7 +185,7 @@ impl Room {
         };
         let [first, second, vertical] = is_covered;
         let n_walls = first.iter().chain(&second).filter(|wall| is_closed(wall)).count();
-        let is_hollow = MIN_ON_SIDES * points.len() as f64 <= n_on_sides as f64;
+        let is_hollow = MIN_ON_SIDES * n_above_floor as f64 <= n_on_sides as f64;
         let [has_floor, has_ceiling] = [0, 1].map(|side| is_closed(&vertical[side]));
         match (is_hollow && has_floor, has_ceiling, n_walls) {
             (true, true, 3..) => Enclosure::WithCeiling,
@@ -339,6 +342,16 @@ mod tests {
         let ball = PointCloud::from_positions(ball.collect());
         assert_eq!(find_room(&ball, Vec3::Z), None);
         assert_eq!(find_room(&PointCloud::default(), Vec3::Z), None);
+    }
+
+    #[test]
+    fn a_wood_is_no_room() {
+        let mut random = Random::new(10, 0);
+        let mut within = |size: Vec3| size * Vec3::from_array([0; 3].map(|_| random.next_f32()));
+        let mut points: Vec<Vec3> =
+            (0..20_000).map(|_| within(Vec3::new(50.0, 50.0, 0.0))).collect();
+        points.extend((0..12_000).map(|_| within(Vec3::new(50.0, 50.0, 14.0))));
+        assert_eq!(find_room(&PointCloud::from_positions(points), Vec3::Z), None);
     }
 
     #[test]

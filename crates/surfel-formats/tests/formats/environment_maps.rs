@@ -209,9 +209,9 @@ fn exr_compressions_and_block_types_are_decoded() {
             let expected = Vec3::new(value, 0.5 * value, 100.0 * value);
             // Both compressions are lossy, and this image has hard edges.
             let is_lossy = matches!(compression, Compression::B44 | Compression::DWAA(_));
-            let share = if is_lossy { 0.25 } else { 0.0 };
+            let allowed = if is_lossy { 0.25 } else { 0.0 };
             let error = (*pixel - expected).abs();
-            let is_near = error.cmple(share * Vec3::new(63.0, 31.5, 6300.0)).all();
+            let is_near = error.cmple(allowed * Vec3::new(63.0, 31.5, 6300.0)).all();
             assert!(is_near, "{compression:?} {i}: {pixel}");
         }
     }

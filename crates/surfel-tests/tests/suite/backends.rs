@@ -280,7 +280,7 @@ fn pictures_of_a_gpu_equal_the_references() {
     let Some(gpu) = gpu() else { return };
     // The references of the CPU have 8 bits, where rounding alone may make a step.
     let n_pixels = (TOLERANCE.other_pixels * 96.0 * 72.0) as usize;
-    let allowed = reference::Difference { n_pixels, n_steps: TOLERANCE.steps };
+    let allowed = reference::ByteDifference { n_pixels, n_steps: TOLERANCE.steps };
     reference::check(gpu, &kinds().collect::<Vec<_>>(), allowed);
 }
 

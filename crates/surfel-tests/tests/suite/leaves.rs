@@ -1,11 +1,13 @@
 //! Scattered points as clusters of leaves: fast searches against brute force, in packets and as single rays.
 
+use crate::materials::{SETTINGS, WHITE_SKY, rgb, scene};
 use std::collections::BTreeMap;
-use surfel_core::flat::{FlatCloud, FlatPoints};
+use surfel_core::flat::{FlatCloud, FlatGeometry, FlatPoints, FlatScene};
 use surfel_core::math::{DAffine3, DVec3, LaneMask, Lanes, PortableLanes, Random, Ray, Vec3};
 use surfel_core::points::Structure;
 use surfel_core::progress::NoProgress;
-use surfel_core::scene::{Clip, ClipPlane, CloudGeometry};
+use surfel_core::render::Settings;
+use surfel_core::scene::{Clip, ClipPlane, CloudGeometry, Geometry, Graph, Light, Material, Morph};
 use surfel_core::surface::{Leaves, RayLanes, Shape, SurfaceKind};
 use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
 use surfel_tests::clouds;
@@ -99,17 +101,19 @@ fn all_searches_find_the_nearest_leaf_before_the_ground() {
     }
 }
 
+/// Returns the mirrors of all clusters, by the indices of their points.
+fn mirrors(points: &FlatPoints) -> BTreeMap<u32, Vec3> {
+    points.slots().map(|slot| (points.id(slot), points.normal(slot))).collect()
+}
+
 #[test]
 fn clusters_stay_the_same_where_others_are_clipped() {
-    let normals = |points: &FlatPoints| -> BTreeMap<u32, Vec3> {
-        points.slots().map(|slot| (points.id(slot), points.normal(slot))).collect()
-    };
     let mut tree = tree();
-    let whole = normals(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
+    let whole = mirrors(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
     let plane = ClipPlane { point: 0.9 * DVec3::Z, normal: -DVec3::Z };
     let clip = Clip { plane: Some(plane), ..Clip::default() };
     let kept = tree.clip(&clip, &DAffine3::IDENTITY).unwrap();
-    let part = normals(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
+    let part = mirrors(&FlatCloud::new(&tree, &NoProgress).unwrap().scatter);
     assert!(300 < part.len() && part.len() == kept.len(), "{} {}", part.len(), kept.len());
     for (id, normal) in part {
         assert_eq!(normal, whole[&kept[id as usize]]);
@@ -143,4 +147,68 @@ fn rays_that_leave_a_leaf_do_not_hit_it_again() {
     };
     let pairs = on_leaf.iter().copied().zip(&secondary).zip(&again);
     assert!(1000 < on_leaf.len() && !pairs.into_iter().any(is_itself), "{}", on_leaf.len());
+}
+
+/// A tree that is refitted to moved points has their clusters where the points are, each with the leaves that it had.
+#[test]
+fn clusters_move_with_their_points() {
+    let at_rest = tree();
+    let move_by = |p: Vec3| Vec3::new(0.3 * p.z, 0.1 * p.x, 0.2 * p.y);
+    let offsets = at_rest.cloud().positions.iter().map(|position| move_by(*position)).collect();
+    let bent = scenes::changed(&at_rest, |cloud| {
+        cloud.morphs = vec![Morph { positions: offsets, ..Morph::default() }];
+    });
+    let mut scene = scenes::lit(bent);
+    scene.graph.nodes[0].morph_weights = vec![0.0];
+    let mut played = FlatScene::new(&scene, &NoProgress).unwrap();
+    scene.graph.nodes[0].morph_weights = vec![1.0];
+    played.update(&scene.graph, &NoProgress).unwrap();
+    let FlatGeometry::Cloud(refitted) = &*played.geometries[0] else { panic!("no cloud") };
+    assert_eq!(refitted.scatter_kind(), SurfaceKind::Leaves);
+    let before = FlatCloud::new(&at_rest, &NoProgress).unwrap();
+    assert_eq!(mirrors(&refitted.scatter), mirrors(&before.scatter));
+    let positions = &at_rest.cloud().positions;
+    for slot in refitted.scatter.slots() {
+        let position = positions[refitted.scatter.id(slot) as usize];
+        assert!(refitted.scatter.center(slot).distance(position + move_by(position)) < 1e-4);
+    }
+    let eye = Vec3::new(0.3, -2.0, 2.5);
+    let mut random = Random::new(8, 0);
+    let mut target = || Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+    let rays: Vec<Ray> = (0..4000)
+        .map(|_| target() + 0.8 * Vec3::Z)
+        .map(|target| Ray::new(eye, (target + move_by(target) - eye).normalize()))
+        .collect();
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    surface_hits(refitted, Simd::detect(), &rays, &mut hits);
+    let mut n_leaves = 0;
+    for (ray, hit) in rays.iter().zip(&hits) {
+        let expected = nearest_leaf(refitted, ray);
+        if hit.surface == SurfaceKind::Leaves && !hit.is_miss() {
+            n_leaves += 1;
+            assert_eq!(Some((hit.distance, hit.slot)), expected);
+        } else {
+            assert!(expected.is_none_or(|(distance, _)| hit.distance <= distance));
+        }
+    }
+    assert!(2000 < n_leaves, "{n_leaves}");
+}
+
+/// Leaves have no inside: light passes through those of glass as through panes, without a colour of their thickness.
+#[test]
+fn leaves_of_glass_are_panes() {
+    let clear = scenes::colored(&tree(), vec![[255; 3]; tree().cloud().len()]);
+    let far_from_its_ground = scenes::changed(&clear, |cloud| {
+        let ground = cloud.positions.iter_mut().filter(|position| position.z < 0.2);
+        ground.for_each(|position| position.x += 1000.0);
+    });
+    let dark = Material { attenuation_color: Vec3::ZERO, ..Material::GLASS };
+    let dark = Material { attenuation_distance: 0.01, ..dark };
+    let graph = Graph::from_geometry(Geometry::Points(far_from_its_ground), dark);
+    let settings = Settings { width: 48, height: 48, max_depth: 200, ..SETTINGS };
+    let lights = vec![Light::Sky(WHITE_SKY)];
+    let image = scenes::render(&scene(graph, lights, scenes::from_above(1.0)), &settings);
+    let covered: Vec<f32> = image.color.iter().filter(|p| 0.99 < p[3]).map(|p| rgb(*p).y).collect();
+    let mean = covered.iter().sum::<f32>() / covered.len() as f32;
+    assert!(300 < covered.len() && (mean - 1.0).abs() < 0.01, "{} {mean}", covered.len());
 }

@@ -1,5 +1,6 @@
 //! Surfaces of points compared with the meshes that the points were taken from, in a short form of the benchmark.
 
+use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Random, Ray, Vec3};
 use surfel_core::points::{PointCloud, Preparation};
@@ -117,4 +118,39 @@ fn a_plane_of_random_points_has_no_hole() {
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
     trace::surface_hits(&flat, Simd::detect(), &rays, &mut hits);
     assert_eq!(hits.iter().filter(|hit| hit.is_miss()).count(), 0);
+}
+
+/// Neither denoising nor the closing of gaps covers openings that are much wider than the spacing of the points.
+#[test]
+fn windows_of_a_noisy_wall_stay_open() {
+    // The wall |x| < 3, |y| < 2 has two rows of windows, 0.6 wide and 0.8 high, about these centres.
+    let windows =
+        || (0..8).map(|i| Vec3::new((i % 4) as f32 * 1.4 - 2.1, (i / 4) as f32 - 0.5, 0.0));
+    let size = Vec3::new(0.6, 0.8, 0.0);
+    let beside = |position: Vec3| {
+        let beyond = |center: Vec3| ((position - center).abs() - 0.5 * size).with_z(-9.0);
+        windows().map(|center| beyond(center).max_element()).fold(f32::INFINITY, f32::min)
+    };
+    let mut random = Random::new(12, 0);
+    let mut anywhere =
+        || Vec3::new(6.0 * random.next_f32() - 3.0, 4.0 * random.next_f32() - 2.0, 0.0);
+    let mut points: Vec<Vec3> = (0..48_000).map(|_| anywhere()).collect();
+    points.retain(|position| 0.0 < beside(*position));
+    let spacing = (24.0 / 48_000f32).sqrt();
+    let mut random = Random::new(13, 0);
+    let mut noise = || 0.5 * spacing * random.next_gaussian() as f32;
+    points.iter_mut().for_each(|p| *p += Vec3::new(noise(), noise(), noise()));
+    let wall = as_by_default(PointCloud::from_positions(points));
+    let rays = rays_from_above(1.9, 200);
+    let (mut n_open, mut n_closed) = (0, 0);
+    for (ray, hit) in rays.iter().zip(hits(&wall, &rays)) {
+        let beside = beside(ray.origin.with_z(0.0));
+        if beside < -2.0 * spacing {
+            n_open += 1;
+            assert!(hit.is_miss(), "{}", ray.origin);
+        } else if spacing < beside {
+            n_closed += usize::from(hit.is_miss());
+        }
+    }
+    assert!(5000 < n_open && n_closed < 10, "{n_open} {n_closed}");
 }

@@ -94,12 +94,12 @@ fn pictures_equal_their_references() {
             save_image(&reference(name), &image, &ImageOptions::default()).unwrap();
         }
     }
-    let allowed = Difference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS };
+    let allowed = ByteDifference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS };
     check(&backends::cpu(), &SurfaceKind::ALL.map(|(_, kind)| kind), allowed);
 }
 
 /// Fails unless the pictures of a renderer equal the references of these kinds, up to an allowed difference.
-pub fn check(renderer: &dyn Renderer, kinds: &[SurfaceKind], allowed: Difference) {
+pub fn check(renderer: &dyn Renderer, kinds: &[SurfaceKind], allowed: ByteDifference) {
     let failures = kinds.iter().filter_map(|kind| {
         let name = kind.name();
         compare(name, &picture(*kind, renderer), &reference(name), allowed)
@@ -114,14 +114,14 @@ fn reference(name: &str) -> PathBuf {
 
 /// The number of pixels that differ and the greatest difference of a channel in 8-bit steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Difference {
+pub struct ByteDifference {
     /// Number of pixels that differ.
     pub n_pixels: usize,
     /// Greatest difference of a channel.
     pub n_steps: u8,
 }
 
-impl Difference {
+impl ByteDifference {
     fn new(found: &[u8], expected: &[u8]) -> Self {
         let pairs = || found.iter().zip(expected);
         let n_pixels = found.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| a != b).count();
@@ -134,13 +134,13 @@ impl Difference {
 }
 
 /// Returns a message if a picture differs from its reference, and writes both and their difference.
-fn compare(name: &str, image: &Image, reference: &Path, allowed: Difference) -> Option<String> {
+fn compare(name: &str, image: &Image, reference: &Path, allowed: ByteDifference) -> Option<String> {
     let found = decode_png(&encode_png(image, &ImageOptions::default()).unwrap());
     let expected = fs::read(reference);
     let expected = expected.unwrap_or_else(|error| panic!("{}: {error}", reference.display()));
     let expected = decode_png(&expected);
     assert_eq!(found.len(), expected.len(), "{name}");
-    let difference = Difference::new(&found, &expected);
+    let difference = ByteDifference::new(&found, &expected);
     if difference.is_within(allowed) {
         return None;
     }
@@ -159,7 +159,7 @@ fn compare(name: &str, image: &Image, reference: &Path, allowed: Difference) -> 
         *shown = [channel(0), channel(1), channel(2), 1.0];
     }
     write("difference", &shown);
-    let Difference { n_pixels, n_steps } = difference;
+    let ByteDifference { n_pixels, n_steps } = difference;
     let folder = folder.display();
     Some(format!(
         "{name}: {n_pixels} pixels differ, by up to {n_steps} steps; see {folder}/{name}.*.png"
@@ -179,9 +179,9 @@ fn three_changed_pixels_or_one_wrong_pixel_fail() {
     let changed = |n_pixels: usize, n_steps: u8| {
         let mut found = reference.clone();
         found.iter_mut().step_by(4 * 97).take(n_pixels).for_each(|channel| *channel += n_steps);
-        let difference = Difference::new(&found, &reference);
-        assert_eq!(difference, Difference { n_pixels, n_steps });
-        difference.is_within(Difference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS })
+        let difference = ByteDifference::new(&found, &reference);
+        assert_eq!(difference, ByteDifference { n_pixels, n_steps });
+        difference.is_within(ByteDifference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS })
     };
     assert!(changed(0, 0) && changed(2, 4));
     assert!(!changed(3, 1) && !changed(1, 5));

@@ -6,6 +6,7 @@
 //! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
 
 use super::above_land::is_above_land;
+use super::crown_patches::scatter_crown_patches;
 use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
 use super::junctions::join_to_surfaces;
 use super::neighborhood_stats::Typical;
@@ -85,15 +86,13 @@ pub fn find_structures(
     join_faces(tree, &mut shapes, progress)?;
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
     let n_rough = count_rough(fits);
+    let land = is_vegetated(&shapes, n_rough).then(|| land_normal(positions, &shapes));
     let widened = match rings {
         Some((rings, scanner)) => {
             close_ring_gaps(tree, rings, scanner, &mut shapes, progress)?;
             Vec::new()
         }
-        None => {
-            let land = is_vegetated(&shapes, n_rough).then(|| land_normal(&shapes));
-            widen_lines(positions, land, &mut shapes, progress)?
-        }
+        None => widen_lines(positions, land, &mut shapes, progress)?,
     };
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
@@ -107,6 +106,9 @@ pub fn find_structures(
         above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
         if let Some(normals) = stated_normals {
             join_by_stated_normals(tree, normals, &mut structures, &mut shapes, progress)?;
+        }
+        if let Some(land) = land {
+            scatter_crown_patches(tree, &shapes, land, &mut structures, progress)?;
         }
         structures
     };

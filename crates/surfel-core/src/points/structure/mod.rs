@@ -21,6 +21,7 @@ pub mod see_through;
 pub mod scan_lines;
 pub mod ring_surfaces;
 pub mod stated_normals;
+pub mod crown_patches;
 pub mod find_structures;
 pub mod sparse_walls;
 pub mod below_roofs;

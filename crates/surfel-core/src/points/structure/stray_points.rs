@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Minimum fraction of the points on surfaces of a cloud that has stray points: those of a forest all stand for themselves.
-const MIN_ON_SURFACES: f32 = 0.5;
+const MIN_ON_SURFACES: f32 = 0.4;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
 const TRUSTED_DISCS: f64 = 0.95;

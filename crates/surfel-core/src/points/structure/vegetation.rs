@@ -1,7 +1,7 @@
 //! Vegetation in clouds, and the land under it.
 
 use super::point_shape::{PointShape, Structure, is_line, is_surface};
-use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
 use crate::points::PointCloud;
 use crate::points::normals::planes::PlaneFit;
 use crate::points::up::is_mostly_land;
@@ -61,15 +61,44 @@ pub fn count_scattered(shapes: &[PointShape]) -> usize {
     shapes.iter().filter(|shape| shape.structure == Structure::Scatter).count()
 }
 
-/// Returns the direction, of either sign, to which the normals of the surface points are nearest: amid vegetation that of the
-/// land.
-pub fn land_normal(shapes: &[PointShape]) -> Vec3 {
+/// Returns the direction to which the normals of the surface points are nearest, amid vegetation that of the land, on the
+/// side of the scattered points.
+pub fn land_normal(positions: &[Vec3], shapes: &[PointShape]) -> Vec3 {
     let mut scatter = SymmetricMatrix::default();
-    for shape in shapes.iter().filter(|shape| shape.structure == Structure::Surface) {
-        // The eigenvector of the least eigenvalue of the negative matrix.
-        scatter.add_outer(shape.normal.as_dvec3(), -1.0);
+    let (mut surface, mut scattered) = (Mean::default(), Mean::default());
+    for (position, shape) in positions.iter().zip(shapes) {
+        match shape.structure {
+            Structure::Surface => {
+                // The eigenvector of the least eigenvalue of the negative matrix.
+                scatter.add_outer(shape.normal.as_dvec3(), -1.0);
+                surface.add(*position);
+            }
+            Structure::Scatter => scattered.add(*position),
+            Structure::Line | Structure::Redundant => {}
+        }
     }
-    smallest_eigenvector(&scatter).0.as_vec3()
+    let normal = smallest_eigenvector(&scatter).0;
+    let is_up = 0.0 <= normal.dot(scattered.value() - surface.value());
+    if is_up { normal.as_vec3() } else { -normal.as_vec3() }
+}
+
+/// The mean of positions.
+#[derive(Default)]
+struct Mean {
+    sum: DVec3,
+    n: usize,
+}
+
+impl Mean {
+    fn add(&mut self, position: Vec3) {
+        self.sum += position.as_dvec3();
+        self.n += 1;
+    }
+
+    /// Returns the mean; zero if there are no positions.
+    fn value(&self) -> DVec3 {
+        self.sum / self.n.max(1) as f64
+    }
 }
 
 #[cfg(test)]
@@ -120,5 +149,15 @@ mod tests {
         let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
         cloud.classification = Some([vec![6; 49], vec![5; 51]].concat());
         assert!(!has_leaves(&cloud, &structures));
+    }
+
+    #[test]
+    fn the_normal_of_land_points_to_what_grows_on_it() {
+        let shape = |structure| PointShape { structure, normal: Vec3::Y, radius: 1.0 };
+        let shapes = [shape(Structure::Surface), shape(Structure::Scatter)];
+        for up in [Vec3::Y, -Vec3::Y] {
+            let positions = [Vec3::new(3.0, 9.0, 4.0), Vec3::new(0.0, 9.0, 7.0) + 0.5 * up];
+            assert_eq!(land_normal(&positions, &shapes), up);
+        }
     }
 }

@@ -1,0 +1,230 @@
+//! Patches of surface in crowns: by chance some leaves lie in a plane.
+
+use super::point_shape::{PointShape, Structure};
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::radii::radius::kth_distance;
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Number of neighbours with which a point of a surface may be connected.
+const N_LINKS: usize = 8;
+/// Minimum cosine between the normals of connected points.
+const MIN_LINK_COSINE: f32 = 0.7;
+/// Maximum number of points of a patch that is less than one neighbourhood.
+const MAX_LONE: usize = 16;
+/// Maximum number of points of a patch.
+const MAX_POINTS: usize = 128;
+/// Maximum cosine between the normals of a steep patch and of the land.
+const MAX_STEEP_COSINE: f32 = 0.87;
+/// Number of neighbours among which scattered points are counted.
+const N_NEIGHBORS: usize = 64;
+/// Number of nearest ones, whose radius heights are relative to.
+const N_NEAREST: usize = 12;
+/// Height of points beside a patch, in radii.
+const MIN_HEIGHT: f32 = 0.25;
+/// Minimum fraction of the neighbours that are scattered points beside the patch, and those on either side of it.
+const MIN_SCATTERED: f32 = 0.12;
+const MIN_ON_EACH_SIDE: f32 = 0.03;
+
+/// Makes scattered points of the patches of surface in crowns, in clouds with much vegetation: steep patches of at most as
+/// many points as a neighbourhood has, and small ones that lie amid scattered points. Level ones have more of these below
+/// than above. `up` is the normal of the land.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn scatter_crown_patches(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    up: Vec3,
+    structures: &mut [Structure],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let patches = small_patches(tree, shapes, structures, progress)?;
+    let in_crown = |patch: &Vec<u32>| {
+        progress.check()?;
+        Ok(is_in_crown(tree, shapes, structures, up, patch))
+    };
+    let in_crown: Vec<bool> = patches.par_iter().map(in_crown).collect::<Result<_>>()?;
+    let patches = patches.into_iter().zip(in_crown).filter(|(_, in_crown)| *in_crown);
+    for point in patches.flat_map(|(patch, _)| patch) {
+        structures[point as usize] = Structure::Scatter;
+    }
+    Ok(())
+}
+
+/// Returns the points of the patches of surface that have at most `MAX_POINTS` of them.
+fn small_patches(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    structures: &[Structure],
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<u32>>> {
+    let is_surface = |point: usize| structures[point] == Structure::Surface;
+    let links = |point: usize| -> Result<Vec<u32>> {
+        progress.check()?;
+        if !is_surface(point) {
+            return Ok(Vec::new());
+        }
+        let nearest = tree.nearest(tree.positions()[point], N_LINKS, Some(point as u32));
+        let normal = shapes[point].normal;
+        let is_linked = |other: &u32| {
+            let other = *other as usize;
+            is_surface(other) && MIN_LINK_COSINE < normal.dot(shapes[other].normal).abs()
+        };
+        Ok(nearest.iter().map(|neighbor| neighbor.index).filter(is_linked).collect())
+    };
+    let links: Vec<Vec<u32>> =
+        (0..structures.len()).into_par_iter().map(links).collect::<Result<_>>()?;
+    let mut patches = Components::new(structures.len());
+    for (point, links) in links.iter().enumerate() {
+        links.iter().for_each(|other| patches.join(point as u32, *other));
+    }
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); structures.len()];
+    for point in (0..structures.len()).filter(|point| is_surface(*point)) {
+        let root = patches.root(point as u32) as usize;
+        // One more tells that the patch is not small.
+        if members[root].len() <= MAX_POINTS {
+            members[root].push(point as u32);
+        }
+    }
+    let is_small = |members: &Vec<u32>| (1..=MAX_POINTS).contains(&members.len());
+    Ok(members.into_iter().filter(is_small).collect())
+}
+
+/// Returns true if a small patch lies in a crown.
+fn is_in_crown(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    structures: &[Structure],
+    up: Vec3,
+    patch: &[u32],
+) -> bool {
+    let n_steep = patch
+        .iter()
+        .filter(|point| shapes[**point as usize].normal.dot(up).abs() < MAX_STEEP_COSINE)
+        .count();
+    let is_steep = patch.len() < 2 * n_steep;
+    if patch.len() <= MAX_LONE && is_steep {
+        return true;
+    }
+    let (mut n_above, mut n_below) = (0, 0);
+    for point in patch {
+        let position = tree.positions()[*point as usize];
+        let neighbors = tree.nearest(position, N_NEIGHBORS, Some(*point));
+        let min_height = MIN_HEIGHT * kth_distance(&neighbors, N_NEAREST);
+        let normal = shapes[*point as usize].normal;
+        let upward = if normal.dot(up) < 0.0 { -normal } else { normal };
+        let height =
+            |neighbor: &Neighbor| upward.dot(tree.positions()[neighbor.index as usize] - position);
+        let is_scattered =
+            |neighbor: &&Neighbor| structures[neighbor.index as usize] == Structure::Scatter;
+        for height in neighbors.iter().filter(is_scattered).map(height) {
+            n_above += usize::from(min_height < height);
+            n_below += usize::from(height < -min_height);
+        }
+    }
+    let n_neighbors = (N_NEIGHBORS * patch.len()) as f32;
+    let [above, below] = [n_above, n_below].map(|n| n as f32 / n_neighbors);
+    MIN_SCATTERED <= above + below
+        && MIN_ON_EACH_SIDE <= above.min(below)
+        && (is_steep || above < below)
+}
+
+/// Connected components: each is a tree of parents.
+struct Components {
+    parents: Vec<u32>,
+}
+
+impl Components {
+    fn new(n: usize) -> Self {
+        Self { parents: (0..n as u32).collect() }
+    }
+
+    fn root(&mut self, mut point: u32) -> u32 {
+        loop {
+            let parent = self.parents[point as usize];
+            if parent == point {
+                return point;
+            }
+            // Path halving: the parent becomes the grandparent.
+            let above = self.parents[parent as usize];
+            self.parents[point as usize] = above;
+            point = above;
+        }
+    }
+
+    /// Joins two components; the lesser root remains.
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Level and steep patches on land, in a crown and on their own.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::NoProgress;
+
+    /// Makes points of a kind with a normal, in a box about a position.
+    struct Wood {
+        random: Random,
+        positions: Vec<Vec3>,
+        shapes: Vec<PointShape>,
+    }
+
+    impl Wood {
+        fn add(&mut self, n: usize, center: Vec3, size: Vec3, structure: Structure, normal: Vec3) {
+            for _ in 0..n {
+                let offset = Vec3::from_array([0; 3].map(|_| self.random.next_f32() - 0.5));
+                self.positions.push(center + size * offset);
+                self.shapes.push(PointShape { structure, normal, radius: 1.0 });
+            }
+        }
+    }
+
+    #[test]
+    fn small_patches_amid_leaves_are_scattered_and_others_stay() {
+        let mut wood =
+            Wood { random: Random::new(3, 0), positions: Vec::new(), shapes: Vec::new() };
+        let level = Vec3::new(4.0, 4.0, 0.01);
+        let upright = Vec3::new(4.0, 0.01, 4.0);
+        let crown = Vec3::new(0.0, 0.0, 15.0);
+        let clearing = Vec3::new(70.0, 0.0, 0.5);
+        let mut ends = Vec::new();
+        for (n, center, size, structure, normal) in [
+            (8000, Vec3::ZERO, Vec3::new(90.0, 90.0, 0.01), Structure::Surface, Vec3::Z),
+            (3000, crown, Vec3::splat(14.0), Structure::Scatter, Vec3::X),
+            // Amid the crown.
+            (60, crown, upright, Structure::Surface, Vec3::Y),
+            (60, crown - 3.0 * Vec3::Z, level, Structure::Surface, Vec3::Z),
+            // Too few for a neighbourhood.
+            (10, Vec3::new(30.0, 0.0, 6.0), upright, Structure::Surface, Vec3::Y),
+            // A wall without leaves, a clearing under bushes, and land that is an island.
+            (100, Vec3::new(-30.0, 0.0, 3.0), upright, Structure::Surface, Vec3::Y),
+            (100, clearing, level, Structure::Surface, Vec3::Z),
+            (300, clearing + Vec3::Z, Vec3::new(6.0, 6.0, 1.0), Structure::Scatter, Vec3::X),
+        ] {
+            wood.add(n, center, size, structure, normal);
+            ends.push(wood.positions.len());
+        }
+        let tree = KdTree::new(&wood.positions, &NoProgress).unwrap();
+        let mut structures: Vec<Structure> =
+            wood.shapes.iter().map(|shape| shape.structure).collect();
+        scatter_crown_patches(&tree, &wood.shapes, Vec3::Z, &mut structures, &NoProgress).unwrap();
+        let scattered = |of: usize| {
+            let part = &structures[of.checked_sub(1).map_or(0, |before| ends[before])..ends[of]];
+            let n_scattered = part.iter().filter(|one| **one == Structure::Scatter).count();
+            n_scattered as f32 / part.len() as f32
+        };
+        assert_eq!(
+            [0, 1, 2, 3, 4, 5, 6, 7].map(scattered),
+            [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]
+        );
+    }
+}
