@@ -1,6 +1,6 @@
-//! Junctions: where a wall meets a floor that goes on behind it, no plane has half of a point's neighbours. Such points
-//! belong to the surface points nearby in whose planes they lie, and so do points at its borders whose nearest neighbours lie
-//! on a line by chance.
+//! Junctions and borders. Where a wall meets a floor that goes on behind it, no plane has half of a point's neighbours, and at
+//! the border of a surface the nearest neighbours lie on a line by chance. Such points belong to the surface points nearby in
+//! whose planes they lie.
 
 use super::edge_planes::PLANE_THICKNESS;
 use super::point_shape::{PointShape, Structure};
@@ -22,11 +22,12 @@ const N_DEVIATIONS: f32 = 2.5;
 const MAX_THICKNESS: f32 = 0.25;
 /// Minimum number of surface points nearby in whose planes a scattered point lies and whose normals agree.
 const MIN_AGREEING: usize = N_NEIGHBORS / 4;
-/// The same for a point on a line. One on a scan line has neighbours on lines.
+/// Minimum number of them for a point on a line. One on a scan line has neighbours on lines.
 const MIN_AGREEING_ON_LINE: usize = 44;
-/// Where the points beyond the border of a sampling are looked for, in distances from the mean of the neighbours.
+/// Distance beyond the border of a sampling at which other points are looked for, in distances of the point on it from the
+/// mean of its neighbours.
 const BEYOND: f32 = 4.0;
-/// Number of them.
+/// Number of these points.
 const N_BEYOND: usize = 8;
 /// Minimum ratio of their radii to that of a point on the border.
 const MIN_SPARSER: f32 = 2.0;
@@ -36,7 +37,7 @@ const MIN_COSINE: f32 = 0.95;
 const N_ROUNDS: usize = 2;
 
 /// Joins scattered points and points on lines to the surfaces in whose planes they lie. `noise` is that of the points in radii
-/// of their neighbourhoods. Leaves of clouds with much vegetation stay as they are, and so do very noisy clouds.
+/// of their neighbourhoods. Leaves of clouds with much vegetation stay scattered, and so do points of very noisy clouds.
 ///
 /// # Errors
 ///
@@ -48,7 +49,9 @@ pub fn join_to_surfaces(
     progress: &dyn Progress,
 ) -> Result<()> {
     let thickness = PLANE_THICKNESS.max(N_DEVIATIONS * noise);
-    join(tree, Structure::Line, thickness.min(MAX_THICKNESS), shapes, progress)?;
+    for _ in 0..N_ROUNDS {
+        join(tree, Structure::Line, thickness.min(MAX_THICKNESS), shapes, progress)?;
+    }
     if MAX_THICKNESS < thickness {
         return Ok(());
     }
@@ -62,7 +65,7 @@ pub fn join_to_surfaces(
     Ok(())
 }
 
-/// Joins the points of a structure to the surfaces in whose planes they lie.
+/// Joins the points of a structure, scattered ones or those on lines, to the surfaces in whose planes they lie.
 fn join(
     tree: &KdTree,
     structure: Structure,
@@ -78,7 +81,17 @@ fn join(
     let candidates: Vec<usize> = (0..shapes.len()).filter(is_candidate).collect();
     let normal = |point: &usize| {
         progress.check()?;
-        let around = tree.nearest(tree.positions()[*point], N_NEIGHBORS, Some(*point as u32));
+        let nearest = |n| tree.nearest(tree.positions()[*point], n, Some(*point as u32));
+        // Few neighbours are enough to tell most points of scan lines.
+        if structure == Structure::Line {
+            let others = nearest(N_NEAREST);
+            let others = others.iter().map(|other| shapes[other.index as usize].structure);
+            let n_others = others.filter(|other| *other != Structure::Surface).count();
+            if N_NEIGHBORS - min_agreeing < n_others {
+                return Ok(None);
+            }
+        }
+        let around = nearest(N_NEIGHBORS);
         let found = normal_of_surface(tree.positions(), *point, &around, thickness, shapes);
         let is_found = |(n_agreeing, _): &(usize, Vec3)| {
             min_agreeing <= *n_agreeing
@@ -148,6 +161,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::test_clouds::prepared;
     use crate::points::{PointCloud, Preparation, prepare};
     use crate::progress::NoProgress;
 
@@ -166,5 +180,19 @@ mod tests {
         let structures = cloud.structures().unwrap_or_default();
         let n_scattered = structures.iter().filter(|one| **one == Structure::Scatter).count();
         assert!(n_scattered < 12, "{n_scattered}");
+    }
+
+    /// A border point may have neighbours on a line by chance, whose disc would reach across openings.
+    #[test]
+    fn few_points_at_the_borders_of_random_strips_are_on_lines() {
+        let mut random = Random::new(5, 0);
+        let mut anywhere = || Vec3::new(100.0 * random.next_f32(), 160.0 * random.next_f32(), 0.0);
+        let mut points: Vec<Vec3> = (0..16_000).map(|_| anywhere()).collect();
+        // The points are 1 apart, the strips 12 wide and the openings 8.
+        points.retain(|point| point.x % 20.0 < 12.0);
+        let (cloud, structures) = prepared(points);
+        let discs = cloud.radii().iter().zip(&structures);
+        let n_wide = discs.filter(|(r, s)| 4.0 < **r && **s == Structure::Surface).count();
+        assert!(n_wide < 90, "{n_wide}");
     }
 }
