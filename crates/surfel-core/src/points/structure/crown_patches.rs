@@ -7,9 +7,12 @@ use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Number of neighbours with which a point of a surface may be connected.
 const N_LINKS: usize = 8;
+/// Number of points whose links are kept at a time.
+const CHUNK: usize = 1 << 16;
 /// Minimum cosine between the normals of connected points.
 const MIN_LINK_COSINE: f32 = 0.7;
 /// Maximum number of points of a patch that is less than one neighbourhood.
@@ -24,8 +27,9 @@ const N_NEIGHBORS: usize = 64;
 const N_NEAREST: usize = 12;
 /// Height of points beside a patch, in radii.
 const MIN_HEIGHT: f32 = 0.25;
-/// Minimum fraction of the neighbours that are scattered points beside the patch, and those on either side of it.
+/// Minimum fraction of the neighbours of a patch in a crown that are scattered points beside it.
 const MIN_SCATTERED: f32 = 0.12;
+/// Minimum fraction of them on each side of the patch.
 const MIN_ON_EACH_SIDE: f32 = 0.03;
 
 /// Makes scattered points of the patches of surface in crowns, in clouds with much vegetation: steep patches of at most as
@@ -76,22 +80,30 @@ fn small_patches(
         };
         Ok(nearest.iter().map(|neighbor| neighbor.index).filter(is_linked).collect())
     };
-    let links: Vec<Vec<u32>> =
-        (0..structures.len()).into_par_iter().map(links).collect::<Result<_>>()?;
-    let mut patches = Components::new(structures.len());
-    for (point, links) in links.iter().enumerate() {
-        links.iter().for_each(|other| patches.join(point as u32, *other));
-    }
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); structures.len()];
-    for point in (0..structures.len()).filter(|point| is_surface(*point)) {
-        let root = patches.root(point as u32) as usize;
-        // One more tells that the patch is not small.
-        if members[root].len() <= MAX_POINTS {
-            members[root].push(point as u32);
+    let n_points = structures.len();
+    let mut components = Components::new(n_points);
+    for start in (0..n_points).step_by(CHUNK) {
+        let chunk = start..n_points.min(start + CHUNK);
+        let links = chunk.clone().into_par_iter().map(links);
+        let links: Vec<Vec<u32>> = links.collect::<Result<_>>()?;
+        for (point, links) in chunk.zip(links) {
+            links.into_iter().for_each(|other| components.join(point as u32, other));
         }
     }
-    let is_small = |members: &Vec<u32>| (1..=MAX_POINTS).contains(&members.len());
-    Ok(members.into_iter().filter(is_small).collect())
+    let of_surface: Vec<u32> =
+        (0..n_points as u32).filter(|point| is_surface(*point as usize)).collect();
+    let mut sizes = vec![0u32; n_points];
+    for point in &of_surface {
+        sizes[components.root(*point) as usize] += 1;
+    }
+    let mut patches: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for point in of_surface {
+        let root = components.root(point);
+        if sizes[root as usize] as usize <= MAX_POINTS {
+            patches.entry(root).or_default().push(point);
+        }
+    }
+    Ok(patches.into_values().collect())
 }
 
 /// Returns true if a small patch lies in a crown.
