@@ -229,9 +229,8 @@ fn widened(
             continue;
         }
         seen.insert(octant_of_other);
-        let (small, large) =
-            (shape.radius.min(other_shape.radius), shape.radius.max(other_shape.radius));
-        if MIN_UNEVEN_RATIO * small < large {
+        let ratio = shape.radius / other_shape.radius;
+        if MIN_UNEVEN_RATIO < ratio.max(1.0 / ratio) {
             min_empty = MIN_EMPTY;
         }
         let reach = OVERLAP * distance;

@@ -1,4 +1,5 @@
-//! Neighbourhoods of all points of a cloud, by three methods that give the same result.
+//! Neighbourhoods of all points of a cloud, by three methods that give the same result, and the connected components of points
+//! that are linked.
 
 mod all_knn;
 mod brute_force;
@@ -10,6 +11,7 @@ mod nearby_leaves;
 mod neighbor;
 mod neighbor_index;
 mod scan_line;
+mod signed_union_find;
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -21,6 +23,7 @@ pub use brute_force::nearest_by_brute_force;
 pub use kd_tree::KdTree;
 pub(crate) use neighbor::spacing_per_reach;
 pub use neighbor::{Neighbor, Neighborhood};
+pub(crate) use signed_union_find::{Member, SignedUnionFind};
 
 /// The method that finds neighbours. The result does not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 use super::outward_votes::{Voter, outward_votes};
 use crate::error::Result;
 use crate::math::{DVec3, Vec3};
-use crate::points::neighbors::{KdTree, Neighborhood};
+use crate::points::neighbors::{KdTree, Member, Neighborhood, SignedUnionFind};
 use crate::progress::Progress;
 use crate::words::counted;
 use rayon::prelude::*;
@@ -48,7 +48,7 @@ pub fn flips_by_spanning_tree(
     drop((tree, spacings));
     let edges = sorted_edges(&links, normals, progress)?;
     progress.begin("orient", edges.len() as u64);
-    let mut components = SignedUnionFind::new(normals.len(), &voters);
+    let mut components = Components::new(normals.len(), &voters);
     for (edge_idx, &edge) in edges.iter().enumerate() {
         if edge_idx % (1 << 16) == 0 {
             progress.check()?;
@@ -58,7 +58,7 @@ pub fn flips_by_spanning_tree(
         components.join(a, b, normals[a as usize].dot(normals[b as usize]) < 0.0);
     }
     drop((edges, links));
-    let members = components.members(progress)?;
+    let members = components.sets.members(progress)?;
     let votes = components.votes;
     let (backward, n_components) =
         backward_components(positions, normals, &members, &votes, progress)?;
@@ -99,25 +99,6 @@ fn ends(edge: u64, links: &[[u32; DEGREE]]) -> (u32, u32) {
     ((link / DEGREE) as u32, links[link / DEGREE][link % DEGREE])
 }
 
-/// A point as a member of a connected component.
-#[derive(Clone, Copy)]
-struct Member {
-    /// The component's root point.
-    root: u32,
-    /// True if the point's normal is opposite to that of the root.
-    is_flipped: bool,
-}
-
-/// A union-find structure whose members have a sign relative to their root, so that signs need no traversal of the
-/// spanning tree.
-struct SignedUnionFind {
-    /// Parents as `parent << 1 | is_flipped`.
-    parents: Vec<u64>,
-    sizes: Vec<u32>,
-    /// Votes of the members of each root for its outer side.
-    votes: Vec<Votes>,
-}
-
 /// Votes of the members of a component.
 #[derive(Clone, Copy, Default)]
 struct Votes {
@@ -133,62 +114,37 @@ impl Votes {
     }
 }
 
-impl SignedUnionFind {
+/// Connected components whose normals have signs, so that these need no traversal of the spanning tree.
+struct Components {
+    sets: SignedUnionFind,
+    /// Votes of the members of each root for its outer side.
+    votes: Vec<Votes>,
+}
+
+impl Components {
     fn new(n_points: usize, voters: &[Voter]) -> Self {
         let mut votes = vec![Votes::default(); n_points];
         for voter in voters {
             votes[voter.point as usize] = Votes { sum: voter.vote, absolute_sum: voter.vote.abs() };
         }
-        let parents = (0..n_points as u64).map(|i| i << 1).collect();
-        Self { parents, sizes: vec![1; n_points], votes }
-    }
-
-    fn find(&mut self, point: u32) -> Member {
-        let (mut at, mut is_flipped) = (point as usize, false);
-        loop {
-            let parent = self.parents[at];
-            if (parent >> 1) as usize == at {
-                return Member { root: at as u32, is_flipped };
-            }
-            // Path halving: the parent becomes the grandparent, with both signs.
-            let above = self.parents[(parent >> 1) as usize];
-            let grandparent = above ^ (parent & 1);
-            self.parents[at] = grandparent;
-            is_flipped ^= grandparent & 1 == 1;
-            at = (grandparent >> 1) as usize;
-        }
-    }
-
-    fn members(&mut self, progress: &dyn Progress) -> Result<Vec<Member>> {
-        let mut members = Vec::with_capacity(self.parents.len());
-        for point in 0..self.parents.len() as u32 {
-            if point.is_multiple_of(1 << 16) {
-                progress.check()?;
-            }
-            members.push(self.find(point));
-        }
-        Ok(members)
+        Self { sets: SignedUnionFind::new(n_points), votes }
     }
 
     /// Joins the components of two points, unless the votes of both are certain and contradict this.
     fn join(&mut self, a: u32, b: u32, is_opposite: bool) {
-        let (a, b) = (self.find(a), self.find(b));
-        if a.root == b.root {
+        let (a, b) = (self.sets.find(a), self.sets.find(b));
+        let sign = |is_flipped: bool| if is_flipped { -1.0 } else { 1.0 };
+        let [of_a, of_b] = [a, b].map(|member| self.votes[member.root as usize]);
+        let agreement = sign(a.is_flipped ^ b.is_flipped ^ is_opposite) * of_a.sum * of_b.sum;
+        if of_a.are_certain() && of_b.are_certain() && agreement < 0.0 {
             return;
         }
-        let is_flipped = a.is_flipped ^ b.is_flipped ^ is_opposite;
-        let sign = if is_flipped { -1.0 } else { 1.0 };
-        let (above, below) = (a.root as usize, b.root as usize);
-        let [of_a, of_b] = [self.votes[above], self.votes[below]];
-        if of_a.are_certain() && of_b.are_certain() && sign * of_a.sum * of_b.sum < 0.0 {
-            return;
+        if let Some(joined) = self.sets.join(a, b, is_opposite) {
+            let former = self.votes[joined.former_root as usize];
+            let votes = &mut self.votes[joined.root as usize];
+            votes.sum += sign(joined.is_flipped) * former.sum;
+            votes.absolute_sum += former.absolute_sum;
         }
-        let (above, below) =
-            if self.sizes[above] < self.sizes[below] { (below, above) } else { (above, below) };
-        self.parents[below] = (above as u64) << 1 | u64::from(is_flipped);
-        self.sizes[above] += self.sizes[below];
-        self.votes[above].sum += sign * self.votes[below].sum;
-        self.votes[above].absolute_sum += self.votes[below].absolute_sum;
     }
 }
 

@@ -3,7 +3,7 @@
 use super::point_shape::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::neighbors::{KdTree, Neighbor, SignedUnionFind};
 use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -81,26 +81,23 @@ fn small_patches(
         Ok(nearest.iter().map(|neighbor| neighbor.index).filter(is_linked).collect())
     };
     let n_points = structures.len();
-    let mut components = Components::new(n_points);
+    let mut components = SignedUnionFind::new(n_points);
     for start in (0..n_points).step_by(CHUNK) {
         let chunk = start..n_points.min(start + CHUNK);
         let links = chunk.clone().into_par_iter().map(links);
         let links: Vec<Vec<u32>> = links.collect::<Result<_>>()?;
         for (point, links) in chunk.zip(links) {
-            links.into_iter().for_each(|other| components.join(point as u32, other));
+            for other in links {
+                let (own, other) = (components.find(point as u32), components.find(other));
+                components.join(own, other, false);
+            }
         }
     }
-    let of_surface: Vec<u32> =
-        (0..n_points as u32).filter(|point| is_surface(*point as usize)).collect();
-    let mut sizes = vec![0u32; n_points];
-    for point in &of_surface {
-        sizes[components.root(*point) as usize] += 1;
-    }
     let mut patches: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for point in of_surface {
-        let root = components.root(point);
-        if sizes[root as usize] as usize <= MAX_POINTS {
-            patches.entry(root).or_default().push(point);
+    for point in (0..n_points).filter(|point| is_surface(*point)) {
+        let root = components.find(point as u32).root;
+        if components.size(root) as usize <= MAX_POINTS {
+            patches.entry(root).or_default().push(point as u32);
         }
     }
     Ok(patches.into_values().collect())
@@ -145,36 +142,6 @@ fn is_in_crown(
         && (is_steep || above < below)
 }
 
-/// Connected components: each is a tree of parents.
-struct Components {
-    parents: Vec<u32>,
-}
-
-impl Components {
-    fn new(n: usize) -> Self {
-        Self { parents: (0..n as u32).collect() }
-    }
-
-    fn root(&mut self, mut point: u32) -> u32 {
-        loop {
-            let parent = self.parents[point as usize];
-            if parent == point {
-                return point;
-            }
-            // Path halving: the parent becomes the grandparent.
-            let above = self.parents[parent as usize];
-            self.parents[point as usize] = above;
-            point = above;
-        }
-    }
-
-    /// Joins two components; the lesser root remains.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     //! Level and steep patches on land, in a crown and on their own.
@@ -217,7 +184,7 @@ mod tests {
             (60, crown - 3.0 * Vec3::Z, level, Structure::Surface, Vec3::Z),
             // Too few for a neighbourhood.
             (10, Vec3::new(30.0, 0.0, 6.0), upright, Structure::Surface, Vec3::Y),
-            // A wall without leaves, a clearing under bushes, and land that is an island.
+            // A wall without leaves, and a clearing under bushes.
             (100, Vec3::new(-30.0, 0.0, 3.0), upright, Structure::Surface, Vec3::Y),
             (100, clearing, level, Structure::Surface, Vec3::Z),
             (300, clearing + Vec3::Z, Vec3::new(6.0, 6.0, 1.0), Structure::Scatter, Vec3::X),

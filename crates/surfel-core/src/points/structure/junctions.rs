@@ -50,64 +50,82 @@ pub fn join_to_surfaces(
 ) -> Result<()> {
     let thickness = PLANE_THICKNESS.max(N_DEVIATIONS * noise);
     for _ in 0..N_ROUNDS {
-        join(tree, Structure::Line, thickness.min(MAX_THICKNESS), shapes, progress)?;
+        let normal = |point, shapes: &[PointShape]| {
+            normal_at_border(tree, point, thickness.min(MAX_THICKNESS), shapes)
+        };
+        join(Structure::Line, shapes, progress, normal)?;
     }
     if MAX_THICKNESS < thickness {
         return Ok(());
     }
     for _ in 0..N_ROUNDS {
-        let n_scattered = count_scattered(shapes);
-        if MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32 {
+        if MIN_VEGETATION * shapes.len() as f32 <= count_scattered(shapes) as f32 {
             return Ok(());
         }
-        join(tree, Structure::Scatter, thickness, shapes, progress)?;
+        let normal =
+            |point, shapes: &[PointShape]| normal_at_junction(tree, point, thickness, shapes);
+        join(Structure::Scatter, shapes, progress, normal)?;
     }
     Ok(())
 }
 
-/// Joins the points of a structure, scattered ones or those on lines, to the surfaces in whose planes they lie.
+/// Joins those points of a structure to a surface for which `normal` returns its normal.
 fn join(
-    tree: &KdTree,
     structure: Structure,
-    thickness: f32,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
+    normal: impl Fn(usize, &[PointShape]) -> Option<Vec3> + Sync,
 ) -> Result<()> {
-    let min_agreeing = match structure {
-        Structure::Line => MIN_AGREEING_ON_LINE,
-        _ => MIN_AGREEING,
-    };
     let is_candidate = |point: &usize| shapes[*point].structure == structure;
     let candidates: Vec<usize> = (0..shapes.len()).filter(is_candidate).collect();
     let normal = |point: &usize| {
         progress.check()?;
-        let nearest = |n| tree.nearest(tree.positions()[*point], n, Some(*point as u32));
-        // Few neighbours are enough to tell most points of scan lines.
-        if structure == Structure::Line {
-            let others = nearest(N_NEAREST);
-            let others = others.iter().map(|other| shapes[other.index as usize].structure);
-            let n_others = others.filter(|other| *other != Structure::Surface).count();
-            if N_NEIGHBORS - min_agreeing < n_others {
-                return Ok(None);
-            }
-        }
-        let around = nearest(N_NEIGHBORS);
-        let found = normal_of_surface(tree.positions(), *point, &around, thickness, shapes);
-        let is_found = |(n_agreeing, _): &(usize, Vec3)| {
-            min_agreeing <= *n_agreeing
-                && (structure == Structure::Scatter
-                    || !is_sparser_beyond(tree, *point, &around, shapes))
-        };
-        Ok(found.filter(is_found))
+        Ok(normal(*point, shapes))
     };
     let normals = candidates.par_iter().map(normal).collect::<Result<Vec<_>>>()?;
-    for (point, found) in candidates.into_iter().zip(normals) {
-        if let Some((_, normal)) = found {
+    for (point, normal) in candidates.into_iter().zip(normals) {
+        if let Some(normal) = normal {
             shapes[point].structure = Structure::Surface;
             shapes[point].normal = normal;
         }
     }
     Ok(())
+}
+
+/// Returns the normal of the surface that a scattered point belongs to.
+fn normal_at_junction(
+    tree: &KdTree,
+    point: usize,
+    thickness: f32,
+    shapes: &[PointShape],
+) -> Option<Vec3> {
+    let around = tree.nearest(tree.positions()[point], N_NEIGHBORS, Some(point as u32));
+    let (n_agreeing, normal) =
+        normal_of_surface(tree.positions(), point, &around, thickness, shapes)?;
+    (MIN_AGREEING <= n_agreeing).then_some(normal)
+}
+
+/// Returns the normal of the surface at whose border a point on a line lies.
+fn normal_at_border(
+    tree: &KdTree,
+    point: usize,
+    thickness: f32,
+    shapes: &[PointShape],
+) -> Option<Vec3> {
+    let position = tree.positions()[point];
+    // Few neighbours are enough to tell most points of scan lines.
+    let nearest = tree.nearest(position, N_NEAREST, Some(point as u32));
+    let others = nearest.iter().map(|other| shapes[other.index as usize].structure);
+    let n_others = others.filter(|other| *other != Structure::Surface).count();
+    if N_NEIGHBORS - MIN_AGREEING_ON_LINE < n_others {
+        return None;
+    }
+    let around = tree.nearest(position, N_NEIGHBORS, Some(point as u32));
+    let (n_agreeing, normal) =
+        normal_of_surface(tree.positions(), point, &around, thickness, shapes)?;
+    let is_at_border =
+        MIN_AGREEING_ON_LINE <= n_agreeing && !is_sparser_beyond(tree, point, &around, shapes);
+    is_at_border.then_some(normal)
 }
 
 /// Returns true if points of a surface lie far less densely beyond a border than around the point on it: the disc of a point

@@ -64,41 +64,22 @@ pub fn count_scattered(shapes: &[PointShape]) -> usize {
 /// Returns the direction to which the normals of the surface points are nearest, amid vegetation that of the land, on the
 /// side of the scattered points.
 pub fn land_normal(positions: &[Vec3], shapes: &[PointShape]) -> Vec3 {
+    let of = |structure: Structure| {
+        let points = positions.iter().zip(shapes);
+        points.filter(move |(_, shape)| shape.structure == structure)
+    };
     let mut scatter = SymmetricMatrix::default();
-    let (mut surface, mut scattered) = (Mean::default(), Mean::default());
-    for (position, shape) in positions.iter().zip(shapes) {
-        match shape.structure {
-            Structure::Surface => {
-                // The eigenvector of the least eigenvalue of the negative matrix.
-                scatter.add_outer(shape.normal.as_dvec3(), -1.0);
-                surface.add(*position);
-            }
-            Structure::Scatter => scattered.add(*position),
-            Structure::Line | Structure::Redundant => {}
-        }
+    for (_, shape) in of(Structure::Surface) {
+        // The eigenvector of the least eigenvalue of the negative matrix.
+        scatter.add_outer(shape.normal.as_dvec3(), -1.0);
     }
     let normal = smallest_eigenvector(&scatter).0;
-    let is_up = 0.0 <= normal.dot(scattered.value() - surface.value());
+    let mean = |structure| {
+        let sum: DVec3 = of(structure).map(|(position, _)| position.as_dvec3()).sum();
+        sum / of(structure).count().max(1) as f64
+    };
+    let is_up = 0.0 <= normal.dot(mean(Structure::Scatter) - mean(Structure::Surface));
     if is_up { normal.as_vec3() } else { -normal.as_vec3() }
-}
-
-/// The mean of positions.
-#[derive(Default)]
-struct Mean {
-    sum: DVec3,
-    n: usize,
-}
-
-impl Mean {
-    fn add(&mut self, position: Vec3) {
-        self.sum += position.as_dvec3();
-        self.n += 1;
-    }
-
-    /// Returns the mean; zero if there are no positions.
-    fn value(&self) -> DVec3 {
-        self.sum / self.n.max(1) as f64
-    }
 }
 
 #[cfg(test)]
