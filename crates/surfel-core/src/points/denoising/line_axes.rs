@@ -80,7 +80,10 @@ pub fn find_axes(
         if shapes[point].structure != Structure::Line {
             return Ok(None);
         }
-        Ok(StraightLine::of(tree, point, toward_scanner).map(|line| (point, line)))
+        let line = StraightLine::of(tree, point, toward_scanner);
+        // A line is thinner than a capsule is long.
+        let is_thin = |line: &StraightLine| line.radius <= f64::from(shapes[point].radius);
+        Ok(line.filter(is_thin).map(|line| (point, line)))
     };
     let lines = (0..shapes.len()).into_par_iter().map(line).filter_map(Result::transpose);
     let lines: Vec<(usize, StraightLine)> = lines.collect::<Result<_>>()?;
@@ -223,17 +226,17 @@ mod tests {
     fn moved(mut cloud: PointCloud, scanner: Option<Vec3>) -> (PointCloud, Vec<PointShape>) {
         let line = PointShape { structure: Structure::Line, normal: Vec3::Y, radius: 0.1 };
         let mut shapes = vec![line; cloud.len()];
-        let axes = axes(&cloud, scanner);
+        let axes = axes(&cloud, scanner, 0.1);
         let report = move_to_axes(&axes, &mut cloud.positions, &mut shapes).unwrap();
         assert_eq!(report.n_moved, cloud.len());
         assert!((0.5..1.5).contains(&(f64::from(report.mean_distance) / RADIUS)), "{report:?}");
         (cloud, shapes)
     }
 
-    /// Returns the axes of a cloud all of whose points are taken for lines.
-    fn axes(cloud: &PointCloud, scanner: Option<Vec3>) -> Vec<LineAxis> {
+    /// Returns the axes of a cloud all of whose points are taken for lines with capsules of this half length.
+    fn axes(cloud: &PointCloud, scanner: Option<Vec3>, radius: f32) -> Vec<LineAxis> {
         let tree = KdTree::new(&cloud.positions, &NoProgress).unwrap();
-        let line = PointShape { structure: Structure::Line, normal: Vec3::Y, radius: 0.1 };
+        let line = PointShape { structure: Structure::Line, normal: Vec3::Y, radius };
         find_axes(cloud, &tree, &vec![line; cloud.len()], scanner, &NoProgress).unwrap()
     }
 
@@ -278,7 +281,18 @@ mod tests {
         let mut random = Random::new(7, 0);
         let mut point = |_| Vec3::from_array(std::array::from_fn(|_| random.next_f32()));
         let cloud = PointCloud::from_positions((0..200).map(&mut point).collect());
-        assert_eq!(axes(&cloud, None), []);
+        assert_eq!(axes(&cloud, None, 0.1), []);
+    }
+
+    #[test]
+    fn lines_as_thick_as_their_capsules_are_long_have_no_axis() {
+        // Stray points far from all others lie on a line by chance.
+        let mut random = Random::new(8, 0);
+        let mut across = || 0.4 * (random.next_f32() - 0.5);
+        let points = (0..40).map(|i| Vec3::new(0.4 * i as f32, across(), across()));
+        let cloud = PointCloud::from_positions(points.collect());
+        assert!(!axes(&cloud, None, 0.5).is_empty());
+        assert_eq!(axes(&cloud, None, 0.1), []);
     }
 
     #[test]

@@ -14,7 +14,9 @@ use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_sur
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
 use super::see_through::open_see_through_discs;
-use super::solids::{apply_structure, ball_radius, clamp_solids, second_distance};
+use super::solids::{
+    apply_structure, ball_radius, clamp_balls_by_range, clamp_solids, second_distance,
+};
 use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
@@ -127,7 +129,10 @@ pub fn find_structures(
     }
     let size = Aabb::of_points(positions.iter().copied()).diagonal();
     clamp_solids(&mut shapes, Structure::Line, typical.radius, size);
-    clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size);
+    match rings {
+        Some((_, scanner)) => clamp_balls_by_range(&mut shapes, positions, scanner, size),
+        None => clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size),
+    }
     limit_stray_points(tree, &mut shapes, progress)?;
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))

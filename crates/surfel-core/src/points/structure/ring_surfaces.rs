@@ -139,8 +139,9 @@ impl RingSurfaces<'_> {
             let radius = |(index, point): (usize, &u32)| {
                 let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
                 let gap = step_rad * self.position(point).distance(self.scanner);
-                let is_wide = gap < shape.radius && shape.structure != Structure::Line;
-                is_wide.then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
+                // Votes may make surfaces of points on lines.
+                (gap < shape.radius)
+                    .then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
             };
             let radii: Vec<Option<f32>> = points.par_iter().enumerate().map(radius).collect();
             for (point, radius) in points.iter().zip(radii) {
@@ -394,12 +395,15 @@ mod tests {
             scanner: Vec3::ZERO,
             max_turn: 0.03,
         };
-        let wide = PointShape { structure: Structure::Surface, normal: Vec3::X, radius: 2.0 };
-        let mut shapes = vec![wide; positions.len()];
-        surfaces.narrow_wide_discs(&mut shapes, &NoProgress).unwrap();
-        for ring in &rings {
-            let middle = shapes[ring.points[100] as usize];
-            assert!((0.4..1.0).contains(&middle.radius), "{middle:?}");
+        // Points on lines may become points of the surface later.
+        for structure in [Structure::Surface, Structure::Line] {
+            let wide = PointShape { structure, normal: Vec3::X, radius: 2.0 };
+            let mut shapes = vec![wide; positions.len()];
+            surfaces.narrow_wide_discs(&mut shapes, &NoProgress).unwrap();
+            for ring in &rings {
+                let middle = shapes[ring.points[100] as usize];
+                assert!((0.4..1.0).contains(&middle.radius), "{middle:?}");
+            }
         }
     }
 

@@ -153,6 +153,28 @@ pub fn clamp_solids(
     }
 }
 
+/// Clamps the radii of the balls of stray points in a scan from one position. Its rays spread, so that balls of a crown are the
+/// larger, the farther it is from the scanner. `size` is that of the cloud.
+pub fn clamp_balls_by_range(
+    shapes: &mut [PointShape],
+    positions: &[Vec3],
+    scanner: Vec3,
+    size: f32,
+) {
+    let ranges = positions.iter().map(|position| position.distance(scanner));
+    let balls = shapes.iter_mut().zip(ranges);
+    let mut balls: Vec<(&mut PointShape, f32)> = balls
+        .filter(|(shape, range)| shape.structure == Structure::Scatter && 0.0 < *range)
+        .collect();
+    let Some(angle) = median(balls.iter().map(|(shape, range)| shape.radius / range)) else {
+        return;
+    };
+    for (shape, range) in &mut balls {
+        let limit = (MAX_SOLID_RATIO * angle * *range).min(MAX_BALL_PER_SIZE * size);
+        shape.radius = shape.radius.min(limit);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     //! The sizes of straight lines and of scattered points.
@@ -222,5 +244,26 @@ mod tests {
             clamp_solids(&mut shapes, structure, f32::INFINITY, 2.0);
             assert!(shapes.iter().all(|shape| shape.radius < 0.4), "{shapes:?}");
         }
+    }
+
+    #[test]
+    fn balls_of_a_scan_grow_with_their_range() {
+        // A crown near the scanner, one far from it, and stray points between them.
+        let scanner = Vec3::new(4.0, -3.0, 1.0);
+        let at = |range: f32| scanner + range * Vec3::Y;
+        let ranges = [vec![10.0; 100], vec![90.0; 100], vec![50.0; 5]].concat();
+        let positions: Vec<Vec3> = ranges.iter().map(|range| at(*range)).collect();
+        let radius = |range: f32| if range == 50.0 { 8.0 } else { 0.004 * range };
+        let shape = |range: &f32| PointShape {
+            structure: Structure::Scatter,
+            normal: Vec3::Z,
+            radius: radius(*range),
+        };
+        let mut shapes: Vec<PointShape> = ranges.iter().map(shape).collect();
+        clamp_balls_by_range(&mut shapes, &positions, scanner, 1000.0);
+        assert!(shapes[..200].iter().zip(&ranges).all(|(shape, r)| shape.radius == 0.004 * r));
+        assert!(shapes[200..].iter().all(|shape| (shape.radius - 0.3).abs() < 1e-5));
+        clamp_balls_by_range(&mut shapes, &positions, scanner, 10.0);
+        assert!(shapes[100..].iter().all(|shape| (shape.radius - 0.2).abs() < 1e-5));
     }
 }

@@ -1,11 +1,12 @@
 //! Vegetation in clouds, and the land under it.
 
 use super::point_shape::{PointShape, Structure, is_line, is_surface};
-use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::math::{DVec3, SymmetricMatrix, Vec3, median, smallest_eigenvector};
 use crate::points::PointCloud;
 use crate::points::normals::planes::PlaneFit;
 use crate::points::up::is_mostly_land;
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Minimum fraction of scattered points in a cloud with much vegetation.
 pub const MIN_VEGETATION: f32 = 0.2;
@@ -13,12 +14,20 @@ pub const MIN_VEGETATION: f32 = 0.2;
 const MIN_SCATTERED_ROUGH: f32 = 0.5;
 /// Minimum number of scattered points of a scanned plant: sparse points of a thin object are scattered, too.
 const MIN_LEAVES: usize = 10_000;
+/// Size of the cells in which crowns are looked for, in median radii of the scattered points: far wider than a noisy edge.
+const CROWN_CELL: f32 = 32.0;
+/// Minimum number of scattered points in a cell that counts.
+const MIN_IN_CELL: u32 = 12;
+/// Minimum fraction of scattered points in a cell within a crown.
+const MIN_SCATTERED_CROWN: f32 = 0.7;
+/// Minimum number of scattered points within crowns.
+const MIN_CROWN: u32 = 2000;
 /// ASPRS classes of low, medium and high vegetation.
 const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 
 /// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
-/// file calls vegetation, those on land, and those of clouds with much of them. Without such classes the points of a cloud
-/// that are all scattered stand for themselves.
+/// file calls vegetation, those on land, those in crowns, and those of clouds with much of them. Without such classes the
+/// points of a cloud that are all scattered stand for themselves.
 pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
     let n_scattered = structures.iter().filter(|structure| is_scattered(structure)).count();
@@ -31,7 +40,38 @@ pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     }
     n_scattered < structures.len()
         && (MIN_LEAVES <= n_scattered && is_much(n_scattered, structures.len())
-            || is_mostly_land(&cloud.positions))
+            || is_mostly_land(&cloud.positions)
+            || has_crowns(cloud, structures))
+}
+
+/// Returns true if most of the scattered points lie in crowns: nearly all points around them are scattered.
+fn has_crowns(cloud: &PointCloud, structures: &[Structure]) -> bool {
+    let Some(radii) = &cloud.radii else { return false };
+    let is_scattered = |point: &usize| structures[*point] == Structure::Scatter;
+    let Some(radius) = median((0..radii.len()).filter(is_scattered).map(|point| radii[point]))
+    else {
+        return false;
+    };
+    let cell = |point: usize| {
+        let cell = cloud.positions[point].as_dvec3() / f64::from(CROWN_CELL * radius);
+        cell.floor().to_array().map(|index| index as i64)
+    };
+    let mut cells: HashMap<[i64; 3], [u32; 2]> = HashMap::new();
+    for point in (0..structures.len()).filter(is_scattered) {
+        cells.entry(cell(point)).or_default()[0] += 1;
+    }
+    cells.retain(|_, counts| MIN_IN_CELL <= counts[0]);
+    for point in 0..structures.len() {
+        if let Some(counts) = cells.get_mut(&cell(point)) {
+            counts[1] += 1;
+        }
+    }
+    let n_scattered: u32 = cells.values().map(|[n_scattered, _]| n_scattered).sum();
+    let in_crowns = cells
+        .values()
+        .filter(|[n_scattered, n]| MIN_SCATTERED_CROWN * *n as f32 <= *n_scattered as f32);
+    let n_in_crowns = in_crowns.map(|[n_scattered, _]| n_scattered).sum();
+    MIN_CROWN <= n_in_crowns && n_scattered <= 2 * n_in_crowns
 }
 
 /// Returns the number of points whose nearest neighbours lie in no plane and on no line.
@@ -130,6 +170,25 @@ mod tests {
         let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
         cloud.classification = Some([vec![6; 49], vec![5; 51]].concat());
         assert!(!has_leaves(&cloud, &structures));
+    }
+
+    #[test]
+    fn crowns_before_a_building_are_leaves() {
+        // A wall, of which scattered points either fill a ball before it or lie along its edges.
+        let mut random = Random::new(5, 0);
+        let mut within = || Vec3::from_array(std::array::from_fn(|_| random.next_f32()));
+        let wall: Vec<Vec3> = (0..97_000).map(|_| Vec3::new(40.0, 0.0, 20.0) * within()).collect();
+        let crown: Vec<Vec3> = (0..3000).map(|_| 4.0 * within() - 8.0 * Vec3::Y).collect();
+        let edges: Vec<Vec3> = wall.iter().step_by(33).map(|p| Vec3::new(p.x, 0.0, 3.0)).collect();
+        for (n_scattered, scattered, expected) in
+            [(3000, &crown, true), (1500, &crown, false), (2900, &edges, false)]
+        {
+            let mut cloud = PointCloud::from_positions([&wall, &scattered[..n_scattered]].concat());
+            cloud.radii = Some(vec![0.08; cloud.len()]);
+            let mut structures = vec![Structure::Surface; cloud.len()];
+            structures[wall.len()..].fill(Structure::Scatter);
+            assert_eq!(has_leaves(&cloud, &structures), expected, "{n_scattered}");
+        }
     }
 
     #[test]
