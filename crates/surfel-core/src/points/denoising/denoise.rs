@@ -108,7 +108,7 @@ pub fn denoise(
     let groups = KdTree::new(&means, progress)?;
     let steps = DepthSteps::find(cloud);
     let noise = Noise::new(&tree, &groups, &order, steps.as_ref(), progress)?;
-    if is_auto && (noise.median() < MIN_NOISE || !noise.is_of_surfaces()) {
+    if is_auto && (noise.median() < MIN_NOISE || !noise.has_surfaces()) {
         return Ok(None);
     }
     let noises = noise.at_points(&tree, &groups, progress)?;

@@ -45,8 +45,20 @@ const MIN_OTHERS: usize = 2;
 /// Ratio of the distance between neighbours to that of the region from which a point is asked for its own noise: regions of
 /// many points in a small place reach far where points are sparse.
 const SPARSE_RATIO: f32 = 2.0;
-/// Minimum fraction of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
+/// Fraction of points up to which the noise can be told in a cloud with leaves, and from which in its regions of surfaces.
+/// Forests have 0.3 to 0.75.
 const MIN_SURFACES: f32 = 0.8;
+/// Minimum fraction of points whose neighbours fill space, among those at which the noise cannot be told, in a cloud with
+/// leaves. Forests have 0.2 to 0.8, noisy animals with claws and horns 0.13.
+const MIN_FILLED: f32 = 0.15;
+/// Minimum fraction of points at which the noise can be told in other clouds.
+const MIN_KNOWN_OF_BENT: f32 = 0.7;
+/// Minimum fraction in a region of a cloud with leaves whose points lie near a plane, as those of the ground do.
+const MIN_KNOWN_OF_SLAB: f32 = 0.5;
+/// Maximum surface variation of these points.
+const MAX_SLAB_VARIATION: f32 = 0.03;
+/// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised.
+const MIN_SURFACE_REGIONS: f32 = 0.1;
 /// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
 /// that a plane must reach over several steps: at half a step, walls across the view stayed in patches.
 const NOISE_PER_STEP: f32 = 1.0;
@@ -59,10 +71,11 @@ pub struct Noise {
     centers: Vec<Vec3>,
     /// Their noise in spacings.
     noises: Vec<RegionNoise>,
-    /// True for each point of a region that fills space, as leaves do.
-    fills_space: Vec<bool>,
-    /// Fraction of the samples whose noise is known.
-    known_fraction: f32,
+    /// Typical noise of those that are surfaces beyond doubt.
+    of_surfaces: Vec<f32>,
+    has_surfaces: bool,
+    /// True for each point of a region that has no noise, as it fills space like leaves.
+    is_at_rest: Vec<bool>,
 }
 
 impl Noise {
@@ -88,36 +101,53 @@ impl Noise {
             Ok(Region::new(tree, groups, points, steps))
         };
         let regions = order.par_chunks(size).map(measure).collect::<Result<Vec<_>>>()?;
-        let mut fills_space = vec![false; tree.positions().len()];
-        let (mut centers, mut noises) = (Vec::new(), Vec::new());
-        let (mut n_known, mut n_samples) = (0, 0);
+        let count = |of: fn(&Region) -> usize| regions.iter().map(of).sum::<usize>() as f32;
+        let n_samples = count(|region| region.n_samples);
+        let n_known = count(|region| region.noises.len());
+        let n_filled = count(|region| region.n_filled);
+        let has_leaves =
+            n_known <= MIN_SURFACES * n_samples && MIN_FILLED * (n_samples - n_known) <= n_filled;
+        let mut noise = Self {
+            centers: Vec::new(),
+            noises: Vec::new(),
+            of_surfaces: Vec::new(),
+            has_surfaces: false,
+            is_at_rest: vec![false; tree.positions().len()],
+        };
         for (points, region) in order.chunks(size).zip(&regions) {
-            n_known += region.noises.len();
-            n_samples += region.n_samples;
-            if let Some(noise) = region.noise() {
-                centers.push(region.center);
-                noises.push(noise);
-            } else if region.fills_space() {
-                points.iter().for_each(|point| fills_space[*point as usize] = true);
+            let is_surface = region.is_known(if has_leaves { MIN_SURFACES } else { MIN_KNOWN });
+            let is_slab =
+                || region.variation < MAX_SLAB_VARIATION && region.is_known(MIN_KNOWN_OF_SLAB);
+            if let Some(found) = region.noise().filter(|_| is_surface || is_slab()) {
+                noise.centers.push(region.center);
+                noise.noises.push(found);
+                if is_surface {
+                    noise.of_surfaces.push(found.typical);
+                }
+            } else if has_leaves || region.fills_space() {
+                points.iter().for_each(|point| noise.is_at_rest[*point as usize] = true);
             }
         }
-        let known_fraction = n_known as f32 / n_samples.max(1) as f32;
-        Ok(Self { centers, noises, fills_space, known_fraction })
+        noise.has_surfaces = match has_leaves {
+            true => MIN_SURFACE_REGIONS * regions.len() as f32 <= noise.of_surfaces.len() as f32,
+            false => MIN_KNOWN_OF_BENT * n_samples < n_known,
+        };
+        Ok(noise)
     }
 
-    /// Returns the median noise over the regions.
+    /// Returns the median noise over the regions of surfaces.
     pub fn median(&self) -> f32 {
         self.quantile(0.5)
     }
 
-    /// Returns the noise that this fraction of the regions does not exceed.
+    /// Returns the noise that this fraction of these regions does not exceed.
     pub fn quantile(&self, fraction: f64) -> f32 {
-        quantile(self.noises.iter().map(|noise| noise.typical), fraction).unwrap_or(0.0)
+        quantile(self.of_surfaces.iter().copied(), fraction).unwrap_or(0.0)
     }
 
-    /// True if the cloud is made of surfaces, not of leaves.
-    pub fn is_of_surfaces(&self) -> bool {
-        MIN_SURFACES < self.known_fraction
+    /// True if the cloud has surfaces, not only leaves.
+    pub fn has_surfaces(&self) -> bool {
+        self.has_surfaces
     }
 
     /// Returns the noise at a position, interpolated between the nearest regions.
@@ -134,7 +164,7 @@ impl Noise {
         RegionNoise { typical: typical / weight, other: other / weight, reach: reach / weight }
     }
 
-    /// Returns the noise at each point in spacings, or none where points fill space.
+    /// Returns the noise at each point in spacings, or none where points are at rest.
     /// `groups` are those of [`Self::new`].
     pub fn at_points(
         &self,
@@ -143,9 +173,9 @@ impl Noise {
         progress: &dyn Progress,
     ) -> Result<Vec<Option<f32>>> {
         let centers = KdTree::new(&self.centers, progress)?;
-        let noise = |(point, fills_space): (usize, &bool)| {
+        let noise = |(point, is_at_rest): (usize, &bool)| {
             progress.check()?;
-            if *fills_space || self.noises.is_empty() {
+            if *is_at_rest || self.noises.is_empty() {
                 return Ok(None);
             }
             let noise = self.at(&centers, points.positions()[point]);
@@ -158,7 +188,7 @@ impl Noise {
             let is_other = noise.is_mixed() && is_noisier(points, point, noise.other);
             Ok(Some(if is_other { noise.other } else { noise.typical }))
         };
-        self.fills_space.par_iter().enumerate().map(noise).collect()
+        self.is_at_rest.par_iter().enumerate().map(noise).collect()
     }
 }
 
@@ -264,6 +294,8 @@ struct Region {
     n_filled: usize,
     /// Median distance from a sample to the last of [`MIN_NOISE_NEIGHBORS`].
     reach: f32,
+    /// Surface variation of the points.
+    variation: f32,
 }
 
 impl Region {
@@ -286,6 +318,8 @@ impl Region {
         let mut noises: Vec<f32> = samples.iter().filter_map(noise).collect();
         noises.sort_unstable_by(f32::total_cmp);
         let fills = |sample: &&NoiseAtPoint| **sample == NoiseAtPoint::FillsSpace;
+        let neighbor = |point: &u32| Neighbor { index: *point, distance_squared: 0.0 };
+        let others: Vec<Neighbor> = points[1..].iter().step_by(GROUP_SIZE).map(neighbor).collect();
         let sum: Vec3 = points.iter().map(|point| tree.positions()[*point as usize]).sum();
         Self {
             center: sum / points.len() as f32,
@@ -293,15 +327,18 @@ impl Region {
             n_filled: samples.iter().filter(fills).count(),
             reach: median(points.iter().step_by(step).map(|point| reach_at(tree, *point)))
                 .unwrap_or_default(),
+            variation: fit_plane(tree.positions(), points[0] as usize, &others).variation,
             noises,
         }
     }
 
-    /// Returns the noise if enough of the samples know it.
+    /// True if the noise is known at this fraction of the samples.
+    fn is_known(&self, min_fraction: f32) -> bool {
+        min_fraction * self.n_samples as f32 <= self.noises.len() as f32
+    }
+
+    /// Returns the noise if any of the samples knows it.
     fn noise(&self) -> Option<RegionNoise> {
-        if (self.noises.len() as f32) < MIN_KNOWN * self.n_samples as f32 {
-            return None;
-        }
         let typical = *self.noises.get(self.noises.len() / 2)?;
         let min_other = MIN_OTHER.max(OTHER_RATIO * typical);
         let n_typical = self.noises.partition_point(|noise| *noise < min_other);

@@ -207,27 +207,38 @@ mod tests {
     use crate::progress::NoProgress;
 
     #[test]
-    fn the_points_of_a_crown_stay_and_those_of_the_ground_below_move() {
-        let mut random = Random::new(8, 0);
-        let ground = (0..9000).map(|_| {
-            let height = 0.25 * random.next_gaussian() as f32;
-            Vec3::new(95.0 * random.next_f32(), 95.0 * random.next_f32(), height)
-        });
-        let mut points: Vec<Vec3> = ground.collect();
-        let n_ground = points.len();
-        let mut within = || 2.0 * random.next_f32() - 1.0;
-        while points.len() < n_ground + 900 {
-            let offset = Vec3::new(within(), within(), within());
-            if offset.length() < 1.0 {
-                points.push(Vec3::new(47.0, 47.0, 12.0) + 6.0 * offset);
+    fn the_points_of_crowns_stay_and_those_of_the_ground_below_move() {
+        // A tree, which takes a tenth of the points, and a wood, which takes half of them.
+        let of_wood = vec![[24.0, 24.0], [70.0, 24.0], [47.0, 70.0]];
+        for (n_of_crowns, crowns, min_moved) in
+            [(900, vec![[47.0, 47.0]], 8500), (9000, of_wood, 6750)]
+        {
+            let mut random = Random::new(8, 0);
+            let ground = (0..9000).map(|_| {
+                let height = 0.25 * random.next_gaussian() as f32;
+                Vec3::new(95.0 * random.next_f32(), 95.0 * random.next_f32(), height)
+            });
+            let mut points: Vec<Vec3> = ground.collect();
+            let n_ground = points.len();
+            let size = 6.0 * (n_of_crowns as f32 / 900.0 / crowns.len() as f32).cbrt();
+            let mut within = || 2.0 * random.next_f32() - 1.0;
+            while points.len() < n_ground + n_of_crowns {
+                let offset = Vec3::new(within(), within(), within());
+                if offset.length() < 1.0 {
+                    let [x, y] = crowns[points.len() % crowns.len()];
+                    points.push(Vec3::new(x, y, 3.0 + 1.5 * size) + size * offset);
+                }
             }
+            let mut cloud = PointCloud::from_positions(points.clone());
+            denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap();
+            let has_moved = |i: &usize| cloud.positions[*i] != points[*i];
+            let n_of_ground = (0..n_ground).filter(has_moved).count();
+            let n_moved = (n_ground..points.len()).filter(has_moved).count();
+            assert!(
+                min_moved < n_of_ground && 3 * n_moved < n_of_crowns,
+                "{n_of_ground} {n_moved}"
+            );
         }
-        let mut cloud = PointCloud::from_positions(points.clone());
-        denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().unwrap();
-        let has_moved = |i: &usize| cloud.positions[*i] != points[*i];
-        let n_of_ground = (0..n_ground).filter(has_moved).count();
-        let n_of_crown = (n_ground..points.len()).filter(has_moved).count();
-        assert!(8800 < n_of_ground && n_of_crown < 250, "{n_of_ground} {n_of_crown}");
     }
 
     #[test]
