@@ -6,8 +6,9 @@
 
 use super::depth_steps::DepthSteps;
 use super::flat_faces::{FlatFaces, SupportPoints};
-use super::noise::{GROUP_SIZE, Noise};
-use super::plants::Plants;
+use super::noise::Noise;
+use super::noise_at_point::{GROUP_SIZE, Surroundings};
+use super::plants::{NoisyPoints, Plants};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -111,14 +112,16 @@ pub fn denoise(
     if is_auto && (noise.median() < MIN_NOISE || !noise.has_surfaces()) {
         return Ok(None);
     }
-    let noises = noise.at_points(&tree, &groups, progress)?;
     drop(tree);
     // Neighbours near each other in memory make the moves 1.6 times as fast in clouds of random order.
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
-    let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
     let tree = KdTree::new(&sorted, progress)?;
+    let surroundings = Surroundings::of_points(&tree, progress)?;
+    let noises = noise.at_points(&tree, &groups, &surroundings, progress)?;
     let ground_noise = noise.quantile(0.25);
-    let plants = Plants::find(&tree, &groups, &noises, ground_noise, cloud, progress)?;
+    let noisy =
+        NoisyPoints { tree: &tree, groups: &groups, surroundings: &surroundings, noises: &noises };
+    let plants = Plants::find(noisy, ground_noise, cloud, progress)?;
     let count = |(point, noise): (usize, &Option<f32>)| {
         progress.check()?;
         let Some(noise) = *noise else { return Ok(0) };

@@ -5,6 +5,7 @@
 
 pub mod depth_steps;
 pub mod flat_faces;
+pub mod noise_at_point;
 pub mod noise;
 pub mod plants;
 pub mod denoise;

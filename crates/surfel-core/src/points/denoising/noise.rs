@@ -1,33 +1,18 @@
 //! The noise of a cloud: the standard deviation of points from their surface, in spacings.
 //!
-//! If a plane fits better the more neighbours it is fitted to, the distances from it are noise, not shape. The noise is
-//! measured at some points of each region.
+//! The noise is measured at some points of each region.
 
 use super::depth_steps::DepthSteps;
+use super::noise_at_point::{
+    GROUP_SIZE, MIN_NOISE_NEIGHBORS, NoiseAtPoint, Surroundings, reach_at,
+};
 use crate::error::Result;
 use crate::math::{Vec3, median, quantile};
 use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
-use crate::points::normals::planes::{PlaneFit, fit_plane};
+use crate::points::normals::planes::fit_plane;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// Number of neighbours per squared spacing of noise at which the surface variation falls below [`MAX_PLANE_VARIATION`].
-const NEIGHBORS_PER_SQUARED_NOISE: f32 = 220.0;
-/// Number of points of a group, whose mean stands for them in large neighbourhoods.
-pub const GROUP_SIZE: usize = 8;
-/// Numbers of neighbours between which the noise is searched.
-const MIN_NOISE_NEIGHBORS: usize = 16;
-const MAX_NOISE_NEIGHBORS: usize = 8192;
-/// Number of neighbours above which groups of points stand for them in this search.
-const MAX_UNGROUPED: usize = 1024;
-/// Surface variation below which a plane fits well enough to tell noise by it.
-const MAX_PLANE_VARIATION: f32 = 0.03;
-/// Surface variation below which noise can be told where the surface begins to bend.
-const MAX_BENT_VARIATION: f32 = 0.08;
-/// Surface variation above which a neighbourhood fills space, as the noise is larger than the neighbourhood.
-const MIN_SPACE_VARIATION: f32 = 0.12;
-/// Ratio of the variation to that of half as many neighbours above which a shape bends, and noise cannot be told.
-const MAX_BEND_RATIO: f32 = 0.75;
 /// Number of points in a region of one noise: a fraction of the cloud, between two limits.
 const REGION_SIZES: [usize; 2] = [256, 4096];
 const N_REGIONS: usize = 256;
@@ -74,7 +59,7 @@ pub struct Noise {
     /// Typical noise of those that are surfaces beyond doubt.
     of_surfaces: Vec<f32>,
     has_surfaces: bool,
-    /// True for each point of a region that has no noise, as it fills space like leaves.
+    /// True for each point, in the order of the regions, of one that has no noise, as it fills space like leaves.
     is_at_rest: Vec<bool>,
 }
 
@@ -112,9 +97,9 @@ impl Noise {
             noises: Vec::new(),
             of_surfaces: Vec::new(),
             has_surfaces: false,
-            is_at_rest: vec![false; tree.positions().len()],
+            is_at_rest: vec![false; order.len()],
         };
-        for (points, region) in order.chunks(size).zip(&regions) {
+        for (region, is_at_rest) in regions.iter().zip(noise.is_at_rest.chunks_mut(size)) {
             let is_surface = region.is_known(if has_leaves { MIN_SURFACES } else { MIN_KNOWN });
             let is_slab =
                 || region.variation < MAX_SLAB_VARIATION && region.is_known(MIN_KNOWN_OF_SLAB);
@@ -125,7 +110,7 @@ impl Noise {
                     noise.of_surfaces.push(found.typical);
                 }
             } else if has_leaves || region.fills_space() {
-                points.iter().for_each(|point| noise.is_at_rest[*point as usize] = true);
+                is_at_rest.fill(true);
             }
         }
         noise.has_surfaces = match has_leaves {
@@ -164,12 +149,13 @@ impl Noise {
         RegionNoise { typical: typical / weight, other: other / weight, reach: reach / weight }
     }
 
-    /// Returns the noise at each point in spacings, or none where points are at rest.
-    /// `groups` are those of [`Self::new`].
+    /// Returns the noise at each point in spacings, or none where points are at rest. `points` and their `surroundings` are
+    /// in the order of [`Self::new`], `groups` are those given there.
     pub fn at_points(
         &self,
         points: &KdTree,
         groups: &KdTree,
+        surroundings: &[Surroundings],
         progress: &dyn Progress,
     ) -> Result<Vec<Option<f32>>> {
         let centers = KdTree::new(&self.centers, progress)?;
@@ -179,13 +165,14 @@ impl Noise {
                 return Ok(None);
             }
             let noise = self.at(&centers, points.positions()[point]);
-            if SPARSE_RATIO * noise.reach < reach_at(points, point as u32)
-                && let NoiseAtPoint::Known(own) = NoiseAtPoint::new(points, groups, point as u32)
-                && (own < MIN_OTHER || is_noisier(points, point, own))
+            let own = surroundings[point];
+            if SPARSE_RATIO * noise.reach < own.reach
+                && let NoiseAtPoint::Known(found) = NoiseAtPoint::new(points, groups, point as u32)
+                && (found < MIN_OTHER || own.are_noisier(points, point, found))
             {
-                return Ok(Some(own));
+                return Ok(Some(found));
             }
-            let is_other = noise.is_mixed() && is_noisier(points, point, noise.other);
+            let is_other = noise.is_mixed() && own.are_noisier(points, point, noise.other);
             Ok(Some(if is_other { noise.other } else { noise.typical }))
         };
         self.is_at_rest.par_iter().enumerate().map(noise).collect()
@@ -207,80 +194,6 @@ impl RegionNoise {
     fn is_mixed(&self) -> bool {
         OTHER_RATIO * self.typical < self.other
     }
-}
-
-/// The points nearest to a position, or the groups that stand for them.
-pub struct NearestPoints<'a> {
-    /// The points, or the means of groups, among which the neighbours are.
-    pub positions: &'a [Vec3],
-    /// Nearest first.
-    pub neighbors: Vec<Neighbor>,
-    /// Number of points that each neighbour stands for.
-    pub group_size: usize,
-}
-
-impl<'a> NearestPoints<'a> {
-    /// Finds the `k` nearest points, as groups if they are many; `None` if there are fewer.
-    fn new(points: &'a KdTree, groups: &'a KdTree, position: Vec3, k: usize) -> Option<Self> {
-        let (tree, group_size) = match MAX_UNGROUPED < k {
-            true => (groups, GROUP_SIZE),
-            false => (points, 1),
-        };
-        let neighbors = tree.nearest(position, k / group_size, None);
-        let is_complete = neighbors.len() == k / group_size;
-        is_complete.then_some(Self { positions: tree.positions(), neighbors, group_size })
-    }
-
-    /// Finds as many as a noise in spacings asks for.
-    pub fn by_noise(
-        points: &'a KdTree,
-        groups: &'a KdTree,
-        position: Vec3,
-        noise: f32,
-    ) -> Option<Self> {
-        let k = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
-        Self::new(points, groups, position, k.clamp(MIN_NOISE_NEIGHBORS, MAX_NOISE_NEIGHBORS))
-    }
-
-    /// Returns the plane through them; `None` if there are none.
-    pub fn plane(&self) -> Option<PlaneFit> {
-        let [nearest, others @ ..] = &self.neighbors[..] else { return None };
-        Some(fit_plane(self.positions, nearest.index as usize, others))
-    }
-}
-
-/// Returns the distance from a point to the last of [`MIN_NOISE_NEIGHBORS`].
-fn reach_at(tree: &KdTree, point: u32) -> f32 {
-    let neighbors =
-        tree.nearest(tree.positions()[point as usize], MIN_NOISE_NEIGHBORS, Some(point));
-    neighbors.last().map_or(0.0, |last| last.distance_squared.sqrt())
-}
-
-/// True if a plane fits the neighbours of a point only if there are as many as a noise in spacings asks for, and the point
-/// is on no other surface.
-fn is_noisier(tree: &KdTree, point: usize, noise: f32) -> bool {
-    let positions = tree.positions();
-    let neighbors = |count| tree.nearest(positions[point], count, Some(point as u32));
-    let few = neighbors(MIN_NOISE_NEIGHBORS);
-    if fit_plane(positions, point, &few).variation < MAX_PLANE_VARIATION {
-        return false;
-    }
-    let n_neighbors = (NEIGHBORS_PER_SQUARED_NOISE * noise * noise) as usize;
-    let neighbors = neighbors(n_neighbors.clamp(MIN_NOISE_NEIGHBORS, MAX_UNGROUPED));
-    let fit = fit_plane(positions, point, &neighbors);
-    fit.variation < MAX_BENT_VARIATION && thins_out(positions, point, &neighbors, fit.normal)
-}
-
-/// True if there are no more points as high above the plane of the neighbours as a point than half as high: noise thins
-/// out with the height, another surface does not.
-fn thins_out(positions: &[Vec3], point: usize, neighbors: &[Neighbor], normal: Vec3) -> bool {
-    let heights = || neighbors.iter().map(|other| normal.dot(positions[other.index as usize]));
-    let level = heights().sum::<f32>() / neighbors.len() as f32;
-    let own = normal.dot(positions[point]) - level;
-    let n_within = |low: f32, high: f32| {
-        heights().filter(|height| (low..high).contains(&((height - level) / own))).count()
-    };
-    n_within(0.75, 1.25) <= n_within(0.25, 0.75)
 }
 
 /// Points near each other, some of which were asked for their noise.
@@ -362,54 +275,6 @@ fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 
     NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
 }
 
-/// The noise around a point.
-#[derive(Clone, Copy, PartialEq)]
-enum NoiseAtPoint {
-    /// The standard deviation, in spacings, from the plane through so many neighbours that a plane fits.
-    Known(f32),
-    /// The surface bends.
-    Bent,
-    /// The neighbours fill space, however many.
-    FillsSpace,
-}
-
-impl NoiseAtPoint {
-    /// Measures the noise around a point from its neighbours, then from groups of points around it.
-    fn new(points: &KdTree, groups: &KdTree, point: u32) -> Self {
-        let center = points.positions()[point as usize];
-        let (mut last_variation, mut has_fallen, mut has_risen) = (f32::INFINITY, false, false);
-        let mut k = MIN_NOISE_NEIGHBORS;
-        while k <= MAX_NOISE_NEIGHBORS {
-            let nearest = NearestPoints::new(points, groups, center, k);
-            let Some(fit) = nearest.and_then(|nearest| nearest.plane()) else {
-                return Self::Bent;
-            };
-            if fit.normal == Vec3::ZERO {
-                return Self::Bent;
-            }
-            let variation = fit.variation;
-            if variation < MAX_PLANE_VARIATION {
-                return Self::Known(fit.residual(k));
-            }
-            if MAX_BEND_RATIO * last_variation < variation {
-                if has_fallen && last_variation < MAX_BENT_VARIATION {
-                    let last = PlaneFit { variation: last_variation, ..fit };
-                    return Self::Known(last.residual(k / 2));
-                }
-                if has_risen && last_variation < MIN_SPACE_VARIATION {
-                    return Self::Bent;
-                }
-                has_risen = true;
-            } else if last_variation < f32::INFINITY {
-                (has_fallen, has_risen) = (true, false);
-            }
-            last_variation = variation;
-            k *= 2;
-        }
-        Self::FillsSpace
-    }
-}
-
 #[cfg(test)]
 mod tests {
     //! Points of different noise on one plane.
@@ -438,8 +303,11 @@ mod tests {
         let tree = KdTree::new(points, &NoProgress).unwrap();
         let order = tree.order();
         let noise = Noise::new(&tree, &tree, &order, None, &NoProgress).unwrap();
-        let noises = noise.at_points(&tree, &tree, &NoProgress).unwrap();
-        let asked = points.iter().zip(noises).filter(|(point, _)| is_asked(point));
+        let sorted: Vec<Vec3> = order.iter().map(|point| points[*point as usize]).collect();
+        let tree = KdTree::new(&sorted, &NoProgress).unwrap();
+        let surroundings = Surroundings::of_points(&tree, &NoProgress).unwrap();
+        let noises = noise.at_points(&tree, &tree, &surroundings, &NoProgress).unwrap();
+        let asked = sorted.iter().zip(noises).filter(|(point, _)| is_asked(point));
         let (n_asked, n_noisy) = asked.fold((0u32, 0usize), |(n_asked, n_noisy), (_, noise)| {
             (n_asked + 1, n_noisy + usize::from(noise.is_some_and(|noise| 1.0 < noise)))
         });

@@ -1,6 +1,6 @@
 //! Plants: their points look like noise of a surface, but are none, and stay where they are.
 
-use super::noise::NearestPoints;
+use super::noise_at_point::{NearestPoints, Surroundings};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -13,8 +13,6 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Number of neighbours that tell whether a point is rough.
-const N_ROUGH_NEIGHBORS: usize = 16;
 /// Least surface variation of the neighbours of a rough point, and the least ratio to the variation by noise alone.
 const MIN_ROUGH_VARIATION: f32 = 0.06;
 const MIN_ROUGH_RATIO: f32 = 3.0;
@@ -57,42 +55,56 @@ pub struct Plants<'a> {
     in_crown: Vec<bool>,
 }
 
+/// Points, near each other in memory, with what is known about the noise of each.
+#[derive(Clone, Copy)]
+pub struct NoisyPoints<'a> {
+    /// The points.
+    pub tree: &'a KdTree<'a>,
+    /// Means of groups of them.
+    pub groups: &'a KdTree<'a>,
+    /// The nearest points of each.
+    pub surroundings: &'a [Surroundings],
+    /// The noise at each in spacings where it is known.
+    pub noises: &'a [Option<f32>],
+}
+
 impl<'a> Plants<'a> {
-    /// Finds the crowns among the points of `tree`, near each other in memory. `groups` are the means of groups of them,
-    /// `noises` the noise at each point in spacings where it is known, and `noise` that of the ground. There may be low
-    /// plants if `cloud`, whose points they are, is land, and crowns if it states no normals, which only surfaces have.
+    /// Finds the crowns among points. `noise` is that of the ground in spacings. There may be low plants if `cloud`, whose points
+    /// they are, is land, and crowns if it states no normals, which only surfaces have.
     ///
     /// # Errors
     ///
     /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
     pub fn find(
-        tree: &'a KdTree<'a>,
-        groups: &KdTree,
-        noises: &[Option<f32>],
+        points: NoisyPoints<'a>,
         noise: f32,
         cloud: &PointCloud,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let NoisyPoints { tree, surroundings, .. } = points;
         let is_land = is_mostly_land(&cloud.positions);
         if cloud.normals.is_some() {
             return Ok(Self { tree, noise, is_land, in_crown: Vec::new() });
         }
         let positions = tree.positions();
-        let is_rough = rough_points(tree, noise, progress)?;
+        // Neighbours of a rough point lie in no plane, not even in one with the noise of the ground.
+        let max_variation =
+            MIN_ROUGH_VARIATION.max(MIN_ROUGH_RATIO * Surroundings::variation_by_noise(noise));
+        let is_rough = |point: usize| max_variation < surroundings[point].variation;
         let in_crown = |point: usize| {
             progress.check()?;
-            if !is_rough[point] {
+            if !is_rough(point) {
                 return Ok(false);
             }
             let around = tree.nearest(positions[point], N_WIDE_NEIGHBORS, Some(point as u32));
             let near = &around[..N_NEIGHBORS.min(around.len())];
-            let n_rough = near.iter().filter(|other| is_rough[other.index as usize]).count();
+            let n_rough = near.iter().filter(|other| is_rough(other.index as usize)).count();
             Ok(MIN_ROUGH_FRACTION * (near.len() as f32) < n_rough as f32
                 && MIN_WIDE_VARIATION < fit_plane(positions, point, &around).variation)
         };
         let mut in_crown =
             (0..positions.len()).into_par_iter().map(in_crown).collect::<Result<Vec<bool>>>()?;
-        remove_noise(tree, groups, noises, is_land, &mut in_crown, progress)?;
+        remove_noise(points, is_land, &mut in_crown, progress)?;
         let n_in_crowns = in_crown.iter().filter(|in_crown| **in_crown).count();
         let min_fraction = if is_land { MIN_IN_CROWNS_ON_LAND } else { MIN_IN_CROWNS };
         if (n_in_crowns as f32) < min_fraction * positions.len() as f32 {
@@ -115,32 +127,16 @@ impl<'a> Plants<'a> {
     }
 }
 
-/// Returns for each point whether its nearest neighbours lie in no plane, not even in one with a noise in spacings.
-fn rough_points(tree: &KdTree, noise: f32, progress: &dyn Progress) -> Result<Vec<bool>> {
-    let positions = tree.positions();
-    // The squared radius of a disc is four times the variance along each of its axes.
-    let by_noise = noise * noise * 2.0 * PI / N_ROUGH_NEIGHBORS as f32;
-    let is_rough = |(point, position): (usize, &Vec3)| {
-        progress.check()?;
-        let neighbors = tree.nearest(*position, N_ROUGH_NEIGHBORS, Some(point as u32));
-        let variation = fit_plane(positions, point, &neighbors).variation;
-        Ok(MIN_ROUGH_VARIATION.max(MIN_ROUGH_RATIO * by_noise) < variation)
-    };
-    positions.par_iter().enumerate().map(is_rough).collect()
-}
-
 /// Removes those points from crowns whose noise explains that their neighbours fill space.
 fn remove_noise(
-    tree: &KdTree,
-    groups: &KdTree,
-    noises: &[Option<f32>],
+    noisy: NoisyPoints,
     is_land: bool,
     in_crown: &mut [bool],
     progress: &dyn Progress,
 ) -> Result<()> {
     let points: Vec<usize> = (0..in_crown.len()).filter(|point| in_crown[*point]).collect();
     let votes_for_noise = |point: usize| {
-        let has_plane = |ratio: f32| noisy_plane(tree, groups, point, ratio * noises[point]?);
+        let has_plane = |ratio: f32| noisy_plane(noisy, point, ratio * noisy.noises[point]?);
         let plane = NOISE_RATIOS.into_iter().find_map(has_plane);
         plane.is_some_and(|plane| {
             (!is_land || plane.normal.z.abs() < MAX_LEVEL)
@@ -168,7 +164,8 @@ struct NoisyPlane {
 }
 
 /// Returns the plane through as many neighbours of a point as a noise in spacings asks for; `None` if they lie in no plane.
-fn noisy_plane(tree: &KdTree, groups: &KdTree, point: usize, noise: f32) -> Option<NoisyPlane> {
+fn noisy_plane(noisy: NoisyPoints, point: usize, noise: f32) -> Option<NoisyPlane> {
+    let NoisyPoints { tree, groups, .. } = noisy;
     let nearest = NearestPoints::by_noise(tree, groups, tree.positions()[point], noise)?;
     let PlaneFit { normal, variation, .. } = nearest.plane()?;
     if MAX_NOISE_VARIATION < variation {
