@@ -7,7 +7,7 @@
 use super::depth_steps::DepthSteps;
 use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::Noise;
-use super::noise_at_point::{GROUP_SIZE, Surroundings};
+use super::noise_at_point::{GROUP_SIZE, LocalFit};
 use super::plants::{NoisyPoints, Plants};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -46,7 +46,8 @@ pub enum Denoise {
     /// Noisy surfaces without radii, and points on straight lines, are denoised.
     #[default]
     Auto,
-    /// Points are moved however little noise there is; plants, points that fill space and animated clouds stay.
+    /// Points are moved however little noise there is. Plants, points that fill space and animated clouds stay, and of clouds with
+    /// many leaves all but clear surfaces.
     On,
     /// All points stay where they are.
     Off,
@@ -116,11 +117,10 @@ pub fn denoise(
     // Neighbours near each other in memory make the moves 1.6 times as fast in clouds of random order.
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
     let tree = KdTree::new(&sorted, progress)?;
-    let surroundings = Surroundings::of_points(&tree, progress)?;
-    let noises = noise.at_points(&tree, &groups, &surroundings, progress)?;
+    let fits = LocalFit::of_points(&tree, progress)?;
+    let noises = noise.at_points(&tree, &groups, &fits, progress)?;
     let ground_noise = noise.quantile(0.25);
-    let noisy =
-        NoisyPoints { tree: &tree, groups: &groups, surroundings: &surroundings, noises: &noises };
+    let noisy = NoisyPoints { tree: &tree, groups: &groups, fits: &fits, noises: &noises };
     let plants = Plants::find(noisy, ground_noise, cloud, progress)?;
     let count = |(point, noise): (usize, &Option<f32>)| {
         progress.check()?;
@@ -131,6 +131,7 @@ pub fn denoise(
         Ok((NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS) as u32)
     };
     let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
+    drop(fits);
     let (mut moved_points, mut normals) = (positions.clone(), vec![Vec3::ZERO; positions.len()]);
     let results = project_points(&tree, &groups, &order, &counts, &noises, progress)?;
     for (point, (position, normal)) in order.iter().zip(results) {

@@ -3,9 +3,7 @@
 //! The noise is measured at some points of each region.
 
 use super::depth_steps::DepthSteps;
-use super::noise_at_point::{
-    GROUP_SIZE, MIN_NOISE_NEIGHBORS, NoiseAtPoint, Surroundings, reach_at,
-};
+use super::noise_at_point::{GROUP_SIZE, LocalFit, MIN_NOISE_NEIGHBORS, NoiseAtPoint, reach_at};
 use crate::error::Result;
 use crate::math::{Vec3, median, quantile};
 use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
@@ -30,17 +28,18 @@ const MIN_OTHERS: usize = 2;
 /// Ratio of the distance between neighbours to that of the region from which a point is asked for its own noise: regions of
 /// many points in a small place reach far where points are sparse.
 const SPARSE_RATIO: f32 = 2.0;
-/// Fraction of points up to which the noise can be told in a cloud with leaves, and from which in its regions of surfaces.
-/// Forests have 0.3 to 0.75.
-const MIN_SURFACES: f32 = 0.8;
+/// Maximum fraction of points at which the noise can be told in a cloud with leaves. Forests have 0.3 to 0.75.
+const MAX_KNOWN_WITH_LEAVES: f32 = 0.8;
 /// Minimum fraction of points whose neighbours fill space, among those at which the noise cannot be told, in a cloud with
 /// leaves. Forests have 0.2 to 0.8, noisy animals with claws and horns 0.13.
-const MIN_FILLED: f32 = 0.15;
-/// Minimum fraction of points at which the noise can be told in other clouds.
-const MIN_KNOWN_OF_BENT: f32 = 0.7;
-/// Minimum fraction in a region of a cloud with leaves whose points lie near a plane, as those of the ground do.
+const MIN_FILLED_WITH_LEAVES: f32 = 0.15;
+/// Minimum fraction of points at which the noise can be told in a cloud without leaves that is denoised.
+const MIN_KNOWN_WITHOUT_LEAVES: f32 = 0.7;
+/// Minimum fraction of points at which the noise can be told in a region of a surface amid leaves.
+const MIN_KNOWN_OF_SURFACE: f32 = 0.8;
+/// Minimum fraction of points at which the noise can be told in a region near a plane amid leaves, as of the ground.
 const MIN_KNOWN_OF_SLAB: f32 = 0.5;
-/// Maximum surface variation of these points.
+/// Maximum surface variation of points that lie near a plane.
 const MAX_SLAB_VARIATION: f32 = 0.03;
 /// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised.
 const MIN_SURFACE_REGIONS: f32 = 0.1;
@@ -56,10 +55,10 @@ pub struct Noise {
     centers: Vec<Vec3>,
     /// Their noise in spacings.
     noises: Vec<RegionNoise>,
-    /// Typical noise of those that are surfaces beyond doubt.
+    /// Typical noise of the regions at most of whose points it can be told.
     of_surfaces: Vec<f32>,
     has_surfaces: bool,
-    /// True for each point, in the order of the regions, of one that has no noise, as it fills space like leaves.
+    /// True for each point, in the order of the regions, that stays: its region fills space, or is no clear surface amid leaves.
     is_at_rest: Vec<bool>,
 }
 
@@ -90,8 +89,8 @@ impl Noise {
         let n_samples = count(|region| region.n_samples);
         let n_known = count(|region| region.noises.len());
         let n_filled = count(|region| region.n_filled);
-        let has_leaves =
-            n_known <= MIN_SURFACES * n_samples && MIN_FILLED * (n_samples - n_known) <= n_filled;
+        let is_amid_leaves = n_known <= MAX_KNOWN_WITH_LEAVES * n_samples
+            && MIN_FILLED_WITH_LEAVES * (n_samples - n_known) <= n_filled;
         let mut noise = Self {
             centers: Vec::new(),
             noises: Vec::new(),
@@ -100,22 +99,23 @@ impl Noise {
             is_at_rest: vec![false; order.len()],
         };
         for (region, is_at_rest) in regions.iter().zip(noise.is_at_rest.chunks_mut(size)) {
-            let is_surface = region.is_known(if has_leaves { MIN_SURFACES } else { MIN_KNOWN });
+            let is_surface =
+                region.is_known(if is_amid_leaves { MIN_KNOWN_OF_SURFACE } else { MIN_KNOWN });
             let is_slab =
-                || region.variation < MAX_SLAB_VARIATION && region.is_known(MIN_KNOWN_OF_SLAB);
-            if let Some(found) = region.noise().filter(|_| is_surface || is_slab()) {
+                is_amid_leaves && region.lies_near_plane && region.is_known(MIN_KNOWN_OF_SLAB);
+            if let Some(found) = region.noise().filter(|_| is_surface || is_slab) {
                 noise.centers.push(region.center);
                 noise.noises.push(found);
                 if is_surface {
                     noise.of_surfaces.push(found.typical);
                 }
-            } else if has_leaves || region.fills_space() {
+            } else if is_amid_leaves || region.fills_space() {
                 is_at_rest.fill(true);
             }
         }
-        noise.has_surfaces = match has_leaves {
+        noise.has_surfaces = match is_amid_leaves {
             true => MIN_SURFACE_REGIONS * regions.len() as f32 <= noise.of_surfaces.len() as f32,
-            false => MIN_KNOWN_OF_BENT * n_samples < n_known,
+            false => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
         };
         Ok(noise)
     }
@@ -125,9 +125,12 @@ impl Noise {
         self.quantile(0.5)
     }
 
-    /// Returns the noise that this fraction of these regions does not exceed.
+    /// Returns the noise that this fraction of the regions of surfaces does not exceed.
     pub fn quantile(&self, fraction: f64) -> f32 {
-        quantile(self.of_surfaces.iter().copied(), fraction).unwrap_or(0.0)
+        let of_any = self.noises.iter().map(|noise| noise.typical);
+        quantile(self.of_surfaces.iter().copied(), fraction)
+            .or_else(|| quantile(of_any, fraction))
+            .unwrap_or(0.0)
     }
 
     /// True if the cloud has surfaces, not only leaves.
@@ -149,13 +152,13 @@ impl Noise {
         RegionNoise { typical: typical / weight, other: other / weight, reach: reach / weight }
     }
 
-    /// Returns the noise at each point in spacings, or none where points are at rest. `points` and their `surroundings` are
+    /// Returns the noise at each point in spacings, or none where points are at rest. `points` and their `fits` are
     /// in the order of [`Self::new`], `groups` are those given there.
     pub fn at_points(
         &self,
         points: &KdTree,
         groups: &KdTree,
-        surroundings: &[Surroundings],
+        fits: &[LocalFit],
         progress: &dyn Progress,
     ) -> Result<Vec<Option<f32>>> {
         let centers = KdTree::new(&self.centers, progress)?;
@@ -165,14 +168,14 @@ impl Noise {
                 return Ok(None);
             }
             let noise = self.at(&centers, points.positions()[point]);
-            let own = surroundings[point];
+            let own = fits[point];
             if SPARSE_RATIO * noise.reach < own.reach
                 && let NoiseAtPoint::Known(found) = NoiseAtPoint::new(points, groups, point as u32)
-                && (found < MIN_OTHER || own.are_noisier(points, point, found))
+                && (found < MIN_OTHER || own.is_noisier_at(points, point, found))
             {
                 return Ok(Some(found));
             }
-            let is_other = noise.is_mixed() && own.are_noisier(points, point, noise.other);
+            let is_other = noise.is_mixed() && own.is_noisier_at(points, point, noise.other);
             Ok(Some(if is_other { noise.other } else { noise.typical }))
         };
         self.is_at_rest.par_iter().enumerate().map(noise).collect()
@@ -207,8 +210,7 @@ struct Region {
     n_filled: usize,
     /// Median distance from a sample to the last of [`MIN_NOISE_NEIGHBORS`].
     reach: f32,
-    /// Surface variation of the points.
-    variation: f32,
+    lies_near_plane: bool,
 }
 
 impl Region {
@@ -233,6 +235,7 @@ impl Region {
         let fills = |sample: &&NoiseAtPoint| **sample == NoiseAtPoint::FillsSpace;
         let neighbor = |point: &u32| Neighbor { index: *point, distance_squared: 0.0 };
         let others: Vec<Neighbor> = points[1..].iter().step_by(GROUP_SIZE).map(neighbor).collect();
+        let plane = fit_plane(tree.positions(), points[0] as usize, &others);
         let sum: Vec3 = points.iter().map(|point| tree.positions()[*point as usize]).sum();
         Self {
             center: sum / points.len() as f32,
@@ -240,7 +243,7 @@ impl Region {
             n_filled: samples.iter().filter(fills).count(),
             reach: median(points.iter().step_by(step).map(|point| reach_at(tree, *point)))
                 .unwrap_or_default(),
-            variation: fit_plane(tree.positions(), points[0] as usize, &others).variation,
+            lies_near_plane: plane.normal != Vec3::ZERO && plane.variation < MAX_SLAB_VARIATION,
             noises,
         }
     }
@@ -305,8 +308,8 @@ mod tests {
         let noise = Noise::new(&tree, &tree, &order, None, &NoProgress).unwrap();
         let sorted: Vec<Vec3> = order.iter().map(|point| points[*point as usize]).collect();
         let tree = KdTree::new(&sorted, &NoProgress).unwrap();
-        let surroundings = Surroundings::of_points(&tree, &NoProgress).unwrap();
-        let noises = noise.at_points(&tree, &tree, &surroundings, &NoProgress).unwrap();
+        let fits = LocalFit::of_points(&tree, &NoProgress).unwrap();
+        let noises = noise.at_points(&tree, &tree, &fits, &NoProgress).unwrap();
         let asked = sorted.iter().zip(noises).filter(|(point, _)| is_asked(point));
         let (n_asked, n_noisy) = asked.fold((0u32, 0usize), |(n_asked, n_noisy), (_, noise)| {
             (n_asked + 1, n_noisy + usize::from(noise.is_some_and(|noise| 1.0 < noise)))

@@ -137,17 +137,17 @@ fn thins_out(positions: &[Vec3], point: usize, neighbors: &[Neighbor], normal: V
     n_within(0.75, 1.25) <= n_within(0.25, 0.75)
 }
 
-/// The [`MIN_NOISE_NEIGHBORS`] nearest points of a point.
+/// The plane through a point and its [`MIN_NOISE_NEIGHBORS`] nearest points.
 #[derive(Clone, Copy, Default)]
-pub struct Surroundings {
-    /// Distance to the last of them.
+pub struct LocalFit {
+    /// Distance to the last of these points.
     pub reach: f32,
-    /// Their surface variation.
+    /// Surface variation of these points.
     pub variation: f32,
 }
 
-impl Surroundings {
-    /// Finds those of each point.
+impl LocalFit {
+    /// Fits the plane of each point.
     ///
     /// # Errors
     ///
@@ -160,15 +160,9 @@ impl Surroundings {
         })
     }
 
-    /// Returns the variation of points that lie in a plane with a noise in spacings.
-    pub fn variation_by_noise(noise: f32) -> f32 {
-        // The squared radius of a disc is four times the variance along each of its axes.
-        noise * noise * 2.0 * PI / MIN_NOISE_NEIGHBORS as f32
-    }
-
     /// True if a plane fits the neighbours only if there are as many as a noise in spacings asks for, and the point is on no
     /// other surface.
-    pub fn are_noisier(self, tree: &KdTree, point: usize, noise: f32) -> bool {
+    pub fn is_noisier_at(self, tree: &KdTree, point: usize, noise: f32) -> bool {
         if self.variation < MAX_PLANE_VARIATION {
             return false;
         }
@@ -179,4 +173,10 @@ impl Surroundings {
         let fit = fit_plane(positions, point, &neighbors);
         fit.variation < MAX_BENT_VARIATION && thins_out(positions, point, &neighbors, fit.normal)
     }
+}
+
+/// Returns the surface variation of a point's nearest neighbours in a plane with a noise in spacings.
+pub fn variation_by_noise(noise: f32) -> f32 {
+    // The squared radius of a disc is four times the variance along each of its axes.
+    noise * noise * 2.0 * PI / MIN_NOISE_NEIGHBORS as f32
 }

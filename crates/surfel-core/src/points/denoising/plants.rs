@@ -1,6 +1,6 @@
 //! Plants: their points look like noise of a surface, but are none, and stay where they are.
 
-use super::noise_at_point::{NearestPoints, Surroundings};
+use super::noise_at_point::{LocalFit, NearestPoints, variation_by_noise};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -55,16 +55,16 @@ pub struct Plants<'a> {
     in_crown: Vec<bool>,
 }
 
-/// Points, near each other in memory, with what is known about the noise of each.
+/// Points with what is known about the noise of each.
 #[derive(Clone, Copy)]
 pub struct NoisyPoints<'a> {
-    /// The points.
+    /// Points near each other in memory.
     pub tree: &'a KdTree<'a>,
     /// Means of groups of them.
     pub groups: &'a KdTree<'a>,
-    /// The nearest points of each.
-    pub surroundings: &'a [Surroundings],
-    /// The noise at each in spacings where it is known.
+    /// The planes through their nearest neighbours.
+    pub fits: &'a [LocalFit],
+    /// The noise at each point in spacings where it is known.
     pub noises: &'a [Option<f32>],
 }
 
@@ -81,16 +81,15 @@ impl<'a> Plants<'a> {
         cloud: &PointCloud,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let NoisyPoints { tree, surroundings, .. } = points;
+        let NoisyPoints { tree, fits, .. } = points;
         let is_land = is_mostly_land(&cloud.positions);
         if cloud.normals.is_some() {
             return Ok(Self { tree, noise, is_land, in_crown: Vec::new() });
         }
         let positions = tree.positions();
-        // Neighbours of a rough point lie in no plane, not even in one with the noise of the ground.
-        let max_variation =
-            MIN_ROUGH_VARIATION.max(MIN_ROUGH_RATIO * Surroundings::variation_by_noise(noise));
-        let is_rough = |point: usize| max_variation < surroundings[point].variation;
+        let min_rough_variation =
+            MIN_ROUGH_VARIATION.max(MIN_ROUGH_RATIO * variation_by_noise(noise));
+        let is_rough = |point: usize| min_rough_variation < fits[point].variation;
         let in_crown = |point: usize| {
             progress.check()?;
             if !is_rough(point) {

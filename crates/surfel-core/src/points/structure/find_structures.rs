@@ -130,7 +130,9 @@ pub fn find_structures(
     let size = Aabb::of_points(positions.iter().copied()).diagonal();
     clamp_solids(&mut shapes, Structure::Line, typical.radius, size);
     match rings {
-        Some((_, scanner)) => clamp_balls_by_range(&mut shapes, positions, scanner, size),
+        Some((_, scanner)) => {
+            clamp_balls_by_range(&mut shapes, positions, scanner, typical.radius, size)
+        }
         None => clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size),
     }
     limit_stray_points(tree, &mut shapes, progress)?;

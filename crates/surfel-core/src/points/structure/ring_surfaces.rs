@@ -65,7 +65,7 @@ pub fn close_ring_gaps(
     let Some(fullest) = rings.iter().max_by_key(|ring| ring.points.len()) else { return Ok(()) };
     let max_turn = MAX_STEPS * median_step(fullest);
     let surfaces = RingSurfaces { positions: tree.positions(), rings, scanner, max_turn };
-    surfaces.narrow_wide_discs(shapes, progress)?;
+    surfaces.narrow_wide_discs(shapes, |structure| structure != Structure::Line, progress)?;
     for (ring, Ring { points, .. }) in rings.iter().enumerate() {
         let disc = |(index, point): (usize, &u32)| {
             if index.is_multiple_of(4096) {
@@ -94,7 +94,8 @@ pub fn close_ring_gaps(
             shapes[*point as usize] = disc;
         }
     }
-    Ok(())
+    // Points on wide lines, as of a pole that is two points wide, may become points of a surface later.
+    surfaces.narrow_wide_discs(shapes, |structure| structure == Structure::Line, progress)
 }
 
 /// Returns the median step between successive azimuths of a ring, in radians, without those of several turns that repeat.
@@ -127,9 +128,14 @@ struct RingPoint {
 }
 
 impl RingSurfaces<'_> {
-    /// Narrows the discs of nearest neighbours that reach beyond the next ring above, for the highest ring below, up to the
-    /// nearest rays that passed through them.
-    fn narrow_wide_discs(&self, shapes: &mut [PointShape], progress: &dyn Progress) -> Result<()> {
+    /// Narrows the discs of nearest neighbours, of the structures asked for, that reach beyond the next ring above, for the
+    /// highest ring below, up to the nearest rays that passed through them.
+    fn narrow_wide_discs(
+        &self,
+        shapes: &mut [PointShape],
+        is_narrowed: impl Fn(Structure) -> bool + Sync,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         for (ring, Ring { points, elevation_rad, .. }) in self.rings.iter().enumerate() {
             progress.check()?;
             let next =
@@ -139,9 +145,8 @@ impl RingSurfaces<'_> {
             let radius = |(index, point): (usize, &u32)| {
                 let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
                 let gap = step_rad * self.position(point).distance(self.scanner);
-                // Votes may make surfaces of points on lines.
-                (gap < shape.radius)
-                    .then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
+                let is_wide = gap < shape.radius && is_narrowed(shape.structure);
+                is_wide.then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
             };
             let radii: Vec<Option<f32>> = points.par_iter().enumerate().map(radius).collect();
             for (point, radius) in points.iter().zip(radii) {
@@ -395,15 +400,16 @@ mod tests {
             scanner: Vec3::ZERO,
             max_turn: 0.03,
         };
-        // Points on lines may become points of the surface later.
         for structure in [Structure::Surface, Structure::Line] {
             let wide = PointShape { structure, normal: Vec3::X, radius: 2.0 };
-            let mut shapes = vec![wide; positions.len()];
-            surfaces.narrow_wide_discs(&mut shapes, &NoProgress).unwrap();
-            for ring in &rings {
-                let middle = shapes[ring.points[100] as usize];
-                assert!((0.4..1.0).contains(&middle.radius), "{middle:?}");
-            }
+            let narrowed = |asked: Structure| {
+                let mut shapes = vec![wide; positions.len()];
+                surfaces.narrow_wide_discs(&mut shapes, |own| own == asked, &NoProgress).unwrap();
+                rings.each_ref().map(|ring| shapes[ring.points[100] as usize].radius)
+            };
+            let radii = narrowed(structure);
+            assert!(radii.iter().all(|radius| (0.4..1.0).contains(radius)), "{radii:?}");
+            assert_eq!(narrowed(Structure::Scatter), [2.0; 2]);
         }
     }
 

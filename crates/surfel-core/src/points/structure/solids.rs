@@ -131,10 +131,6 @@ pub fn clamp_solids(
     typical_radius: f32,
     size: f32,
 ) {
-    let max_per_size = match structure {
-        Structure::Line => MAX_CAPSULE_PER_SIZE,
-        _ => MAX_BALL_PER_SIZE,
-    };
     let solids = shapes.iter().filter(|shape| shape.structure == structure);
     let n_solids = solids.clone().count();
     let Some(median) = median(solids.map(|shape| shape.radius)) else { return };
@@ -146,33 +142,50 @@ pub fn clamp_solids(
         }
         _ => limit,
     };
-    // Equal points have no size.
-    let limit = if 0.0 < size { limit.min(max_per_size * size) } else { limit };
+    let limit = limit.min(limit_by_size(structure, size));
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
 }
 
 /// Clamps the radii of the balls of stray points in a scan from one position. Its rays spread, so that balls of a crown are the
-/// larger, the farther it is from the scanner. `size` is that of the cloud.
+/// larger, the farther it is from the scanner. A few balls are clamped as [`clamp_solids`] does.
 pub fn clamp_balls_by_range(
     shapes: &mut [PointShape],
     positions: &[Vec3],
     scanner: Vec3,
+    typical_radius: f32,
     size: f32,
 ) {
-    let ranges = positions.iter().map(|position| position.distance(scanner));
-    let balls = shapes.iter_mut().zip(ranges);
-    let mut balls: Vec<(&mut PointShape, f32)> = balls
-        .filter(|(shape, range)| shape.structure == Structure::Scatter && 0.0 < *range)
-        .collect();
-    let Some(angle) = median(balls.iter().map(|(shape, range)| shape.radius / range)) else {
+    let range = |position: &Vec3| position.distance(scanner);
+    let balls = shapes.iter().zip(positions).filter(|(shape, _)| is_ball(shape));
+    let angles = || balls.clone().map(|(shape, position)| shape.radius / range(position));
+    let Some(angle) = median(angles()).filter(|_| MIN_SOLIDS <= angles().count()) else {
+        clamp_solids(shapes, Structure::Scatter, typical_radius, size);
         return;
     };
-    for (shape, range) in &mut balls {
-        let limit = (MAX_SOLID_RATIO * angle * *range).min(MAX_BALL_PER_SIZE * size);
+    let limit_by_size = limit_by_size(Structure::Scatter, size);
+    for (shape, position) in shapes.iter_mut().zip(positions).filter(|(shape, _)| is_ball(shape)) {
+        let limit = match range(position) {
+            0.0 => limit_by_size,
+            range => limit_by_size.min(MAX_SOLID_RATIO * angle * range),
+        };
         shape.radius = shape.radius.min(limit);
     }
+}
+
+fn is_ball(shape: &PointShape) -> bool {
+    shape.structure == Structure::Scatter
+}
+
+/// Returns the maximum radius of a ball or half length of a capsule in a cloud of this size.
+fn limit_by_size(structure: Structure, size: f32) -> f32 {
+    let max_per_size = match structure {
+        Structure::Line => MAX_CAPSULE_PER_SIZE,
+        _ => MAX_BALL_PER_SIZE,
+    };
+    // Equal points have no size.
+    if 0.0 < size { max_per_size * size } else { f32::INFINITY }
 }
 
 #[cfg(test)]
@@ -260,10 +273,13 @@ mod tests {
             radius: radius(*range),
         };
         let mut shapes: Vec<PointShape> = ranges.iter().map(shape).collect();
-        clamp_balls_by_range(&mut shapes, &positions, scanner, 1000.0);
+        clamp_balls_by_range(&mut shapes, &positions, scanner, 0.1, 1000.0);
         assert!(shapes[..200].iter().zip(&ranges).all(|(shape, r)| shape.radius == 0.004 * r));
         assert!(shapes[200..].iter().all(|shape| (shape.radius - 0.3).abs() < 1e-5));
-        clamp_balls_by_range(&mut shapes, &positions, scanner, 10.0);
+        clamp_balls_by_range(&mut shapes, &positions, scanner, 0.1, 10.0);
         assert!(shapes[100..].iter().all(|shape| (shape.radius - 0.2).abs() < 1e-5));
+        // A few are no larger than the discs of a surface.
+        clamp_balls_by_range(&mut shapes[200..], &positions[200..], scanner, 0.1, 10.0);
+        assert!(shapes[200..].iter().all(|shape| shape.radius == 0.1));
     }
 }

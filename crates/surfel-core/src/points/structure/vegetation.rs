@@ -7,6 +7,7 @@ use crate::points::normals::planes::PlaneFit;
 use crate::points::up::is_mostly_land;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Minimum fraction of scattered points in a cloud with much vegetation.
 pub const MIN_VEGETATION: f32 = 0.2;
@@ -41,10 +42,13 @@ pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     n_scattered < structures.len()
         && (MIN_LEAVES <= n_scattered && is_much(n_scattered, structures.len())
             || is_mostly_land(&cloud.positions)
-            || has_crowns(cloud, structures))
+            || !is_much(n_scattered, structures.len())
+                && MIN_CROWN as usize <= n_scattered
+                && has_crowns(cloud, structures))
 }
 
-/// Returns true if most of the scattered points lie in crowns: nearly all points around them are scattered.
+/// Returns true if most of the scattered points, without those that lie alone, are in crowns: at least seven of ten points
+/// around them are scattered.
 fn has_crowns(cloud: &PointCloud, structures: &[Structure]) -> bool {
     let Some(radii) = &cloud.radii else { return false };
     let is_scattered = |point: &usize| structures[*point] == Structure::Scatter;
@@ -52,26 +56,40 @@ fn has_crowns(cloud: &PointCloud, structures: &[Structure]) -> bool {
     else {
         return false;
     };
+    let cells_per_unit = 1.0 / f64::from(CROWN_CELL * radius);
     let cell = |point: usize| {
-        let cell = cloud.positions[point].as_dvec3() / f64::from(CROWN_CELL * radius);
+        let cell = cloud.positions[point].as_dvec3() * cells_per_unit;
         cell.floor().to_array().map(|index| index as i64)
     };
-    let mut cells: HashMap<[i64; 3], [u32; 2]> = HashMap::new();
+    let mut cells: HashMap<[i64; 3], CrownCell> = HashMap::new();
     for point in (0..structures.len()).filter(is_scattered) {
-        cells.entry(cell(point)).or_default()[0] += 1;
+        cells.entry(cell(point)).or_default().n_scattered += 1;
     }
-    cells.retain(|_, counts| MIN_IN_CELL <= counts[0]);
-    for point in 0..structures.len() {
-        if let Some(counts) = cells.get_mut(&cell(point)) {
-            counts[1] += 1;
+    cells.retain(|_, cell| MIN_IN_CELL <= cell.n_scattered);
+    (0..structures.len()).into_par_iter().for_each(|point| {
+        if let Some(cell) = cells.get(&cell(point)) {
+            cell.n_points.fetch_add(1, Ordering::Relaxed);
         }
+    });
+    let n_scattered: u32 = cells.values().map(|cell| cell.n_scattered).sum();
+    let n_in_crowns = cells.values().filter(|cell| cell.is_in_crown()).map(|cell| cell.n_scattered);
+    let n_in_crowns: u32 = n_in_crowns.sum();
+    MIN_CROWN <= n_in_crowns && n_scattered - n_in_crowns <= n_in_crowns
+}
+
+/// A cell of space with scattered points.
+#[derive(Default)]
+struct CrownCell {
+    n_scattered: u32,
+    n_points: AtomicU32,
+}
+
+impl CrownCell {
+    /// True if at least seven of ten points are scattered.
+    fn is_in_crown(&self) -> bool {
+        let n_points = self.n_points.load(Ordering::Relaxed);
+        MIN_SCATTERED_CROWN * n_points as f32 <= self.n_scattered as f32
     }
-    let n_scattered: u32 = cells.values().map(|[n_scattered, _]| n_scattered).sum();
-    let in_crowns = cells
-        .values()
-        .filter(|[n_scattered, n]| MIN_SCATTERED_CROWN * *n as f32 <= *n_scattered as f32);
-    let n_in_crowns = in_crowns.map(|[n_scattered, _]| n_scattered).sum();
-    MIN_CROWN <= n_in_crowns && n_scattered <= 2 * n_in_crowns
 }
 
 /// Returns the number of points whose nearest neighbours lie in no plane and on no line.
@@ -136,7 +154,11 @@ mod tests {
         let positions = (0..n_points).map(|_| size * within()).collect();
         let mut structures = vec![Structure::Surface; n_points];
         structures[..n_scattered].fill(Structure::Scatter);
-        (PointCloud::from_positions(positions), structures)
+        let cloud = PointCloud {
+            radii: Some(vec![0.02; n_points]),
+            ..PointCloud::from_positions(positions)
+        };
+        (cloud, structures)
     }
 
     #[test]
@@ -144,6 +166,7 @@ mod tests {
         let cube = Vec3::ONE;
         for (n_points, n_scattered, size, expected) in [
             (2000, 1500, cube, false),
+            (4000, 3500, cube, false),
             (100_000, 12_000, cube, false),
             (50_000, 12_000, cube, true),
             (12_000, 12_000, cube, false),
