@@ -74,5 +74,5 @@ pub use structure::point_shape::{
 };
 pub use structure::solids::CAPSULE_ASPECT;
 pub use structure::vegetation::has_leaves;
+pub(crate) use up::CameraAxes;
 pub use up::{InferredUp, UpConvention, infer_up};
-pub(crate) use up::{is_camera_frame, is_in_camera_view};

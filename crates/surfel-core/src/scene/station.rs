@@ -6,7 +6,7 @@ use super::direction_cells::{
 use super::ground::direction;
 use super::inside_view::InsideView;
 use crate::math::{self, Aabb, DVec3, Vec3, quantile};
-use crate::points::{PointCloud, is_camera_frame, is_in_camera_view, is_valid_position};
+use crate::points::{CameraAxes, PointCloud, is_valid_position};
 use std::f32::consts::TAU;
 
 /// Maximum number of points that are looked at: enough for some 40 in each cell of directions.
@@ -93,15 +93,16 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
     })
 }
 
-/// Returns the view of the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z with -Y
-/// up, or `None` if its points are not those that such a camera measured.
+/// Returns the view of the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z if -Y is up and
+/// along -Z if +Y is up, or `None` if its points are not those that such a camera measured.
 pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let zero = (-cloud.origin).as_vec3();
     let offsets: Vec<Vec3> = valid_sample(cloud).into_iter().map(|point| point - zero).collect();
-    if up != Vec3::NEG_Y || offsets.len() < MIN_POINTS || !is_camera_frame(&offsets) {
+    let axes = CameraAxes::of_points(&offsets).filter(|axes| axes.up() == up)?;
+    if offsets.len() < MIN_POINTS {
         return None;
     }
-    let in_view = offsets.iter().filter(|offset| is_in_camera_view(**offset));
+    let in_view = offsets.iter().filter(|offset| axes.sees(**offset));
     let slope = in_view.map(|offset| (offset.y / offset.z).abs()).fold(0.0, f32::max);
     let points = polar_points(Vec3::ZERO, &offsets, up);
     let [near, median, far] = distances(&points)?;
@@ -109,7 +110,7 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
     is_scan.then(|| InsideView {
         position: DVec3::ZERO,
-        direction: DVec3::Z,
+        direction: axes.ahead().as_dvec3(),
         distance: median.into(),
         view_angle_deg: 2.0 * f64::from(slope).atan().to_degrees(),
     })
@@ -260,6 +261,11 @@ mod tests {
         assert_eq!((station.position, station.direction), (DVec3::ZERO, DVec3::Z));
         assert!((station.view_angle_deg - 2.0 * 0.4f64.atan().to_degrees()).abs() < 0.1);
         assert_eq!(find_depth_camera(&cloud, Vec3::Y), None);
+        let mut y_up = cloud.clone();
+        y_up.positions.iter_mut().for_each(|position| *position *= Vec3::new(1.0, -1.0, -1.0));
+        let of_y_up = InsideView { direction: DVec3::NEG_Z, ..station };
+        assert_eq!(find_depth_camera(&y_up, Vec3::Y), Some(of_y_up));
+        assert_eq!(find_depth_camera(&y_up, Vec3::NEG_Y), None);
         assert_eq!(find_depth_camera(&depth_image(true), Vec3::NEG_Y), None);
         let mut moved = cloud;
         moved.origin = DVec3::new(0.0, 0.0, -20.0);

@@ -5,7 +5,7 @@
 
 use crate::math::{Random, Vec3};
 use crate::points::PointCloud;
-use crate::points::up::is_camera_frame;
+use crate::points::up::CameraAxes;
 
 /// Number of points that are examined, and the least number that tell depths from other coordinates.
 const N_SAMPLES: usize = 65_536;
@@ -58,9 +58,8 @@ impl DepthSteps {
             Vec3::new(offset.dot(x), offset.dot(y), offset.dot(ahead))
         };
         let seen: Vec<Vec3> = sample.iter().map(seen).collect();
-        let opposite: Vec<Vec3> = seen.iter().map(|point| -*point).collect();
         let depths = coordinates.into_iter().nth(depth)?;
-        let has_camera = is_camera_frame(&seen) || is_camera_frame(&opposite);
+        let has_camera = CameraAxes::of_points(&seen).is_some();
         let is_found = has_camera && 2 * N_AVERAGED < depths.len();
         is_found.then_some(Self { axis: axes[depth], depths })
     }

@@ -1,17 +1,12 @@
 //! Inference of the up axis of a cloud whose file does not state it.
 
 use super::axis_statistics::{AxisStatistics, is_wide_and_flat};
+use super::camera_axes::CameraAxes;
 use super::inferred_up::InferredUp;
 use super::mirror_symmetry::mirror_axis;
 use super::sample::sample;
 use crate::math::Vec3;
 use crate::points::PointCloud;
-
-/// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
-const MAX_CAMERA_SLOPE: f32 = 1.2;
-
-/// Minimum fraction of the points within the field of view of a depth camera.
-const MIN_FRACTION_IN_VIEW: f64 = 0.99;
 
 /// The up axis that a file's format implies.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -54,14 +49,21 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
             Some(found) if found.up == Vec3::Y => found,
             _ => choice(Vec3::Z, format!("up is +Z, the convention of {format}")),
         },
-        // The survey of a drone whose middle is zero lies in the field of view of a camera, too.
-        _ if shape.terrain().is_none() && is_camera_frame(&offsets()) => {
-            let view = "the field of view of a depth camera at the origin";
-            choice(Vec3::NEG_Y, format!("up is -Y: nearly all points lie in {view}"))
+        _ => {
+            // The survey of a drone whose middle is zero lies in the field of view of a camera, too.
+            let is_terrain = shape.terrain().is_some();
+            let camera = CameraAxes::of_points(&offsets()).filter(|_| !is_terrain);
+            match camera.filter(|axes| *axes == CameraAxes::YDown || evidence.is_none()) {
+                Some(axes) => {
+                    let name = if axes.up() == Vec3::Y { "+Y" } else { "-Y" };
+                    let view = "the field of view of a depth camera at the origin";
+                    choice(axes.up(), format!("up is {name}: nearly all points lie in {view}"))
+                }
+                None => evidence
+                    .or_else(|| shape.figure())
+                    .unwrap_or_else(|| choice(Vec3::Z, "up is +Z, the default".to_owned())),
+            }
         }
-        _ => evidence
-            .or_else(|| shape.figure())
-            .unwrap_or_else(|| choice(Vec3::Z, "up is +Z, the default".to_owned())),
     }
 }
 
@@ -97,26 +99,6 @@ pub(crate) fn is_mostly_land(positions: &[Vec3]) -> bool {
         let high = *values.select_nth_unstable_by(last, f32::total_cmp).1;
         f64::from(high - *values.select_nth_unstable_by(n_left_out, f32::total_cmp).1)
     }))
-}
-
-/// Returns true if nearly all points lie in the field of view of a depth camera and fill it. `offsets` are those of the
-/// points from the camera, whose X points right, Y down and Z ahead.
-pub(crate) fn is_camera_frame(offsets: &[Vec3]) -> bool {
-    let sample = sample(offsets);
-    let seen: Vec<Vec3> = sample.iter().copied().filter(|p| is_in_camera_view(*p)).collect();
-    let fills_view = |axis: usize| {
-        let slopes = seen.iter().map(|p| p[axis] / p.z);
-        let (low, high) = slopes.fold((0.0f32, 0.0f32), |(low, high), s| (low.min(s), high.max(s)));
-        // The field of view is at least 20 degrees wide on both sides of the axis together.
-        low < -0.05 && 0.05 < high && 0.35 < high - low
-    };
-    let are_seen = MIN_FRACTION_IN_VIEW * sample.len() as f64 <= seen.len() as f64;
-    are_seen && fills_view(0) && fills_view(1)
-}
-
-/// Returns true if a depth camera sees a point at this offset, whose X points right, Y down and Z ahead.
-pub(crate) fn is_in_camera_view(offset: Vec3) -> bool {
-    offset.x.abs().max(offset.y.abs()) < MAX_CAMERA_SLOPE * offset.z
 }
 
 #[cfg(test)]
@@ -220,8 +202,10 @@ mod tests {
     }
 
     #[test]
-    fn a_depth_camera_at_the_origin_has_y_down() {
+    fn a_depth_camera_at_the_origin_has_y_down_and_z_ahead_or_y_up_and_z_to_the_back() {
         assert_eq!(inferred(depth_frame()), Vec3::NEG_Y);
+        let back = depth_frame().into_iter().map(|p| Vec3::new(p.x, -p.y, -p.z));
+        assert_eq!(inferred(back), Vec3::Y);
         let elsewhere = depth_frame().into_iter().map(|p| p - 2.0 * Vec3::Z);
         assert_eq!(inferred(elsewhere), Vec3::Z);
     }
@@ -249,14 +233,6 @@ mod tests {
         let rebased = depth_frame().into_iter().map(|p| p - 2.0 * Vec3::Z).collect();
         assert_eq!(up(rebased, 2.0 * DVec3::Z), Vec3::NEG_Y);
         assert_eq!(up(depth_frame(), -2.0 * DVec3::Z), Vec3::Z);
-    }
-
-    #[test]
-    fn points_beside_the_view_of_a_depth_camera_do_not_widen_it() {
-        let mut beam = depth_frame();
-        beam.iter_mut().for_each(|p| *p *= Vec3::new(0.1, 0.1, 1.0));
-        beam.extend([Vec3::new(-9.0, -9.0, 1.0), Vec3::new(9.0, 9.0, 1.0)]);
-        assert!(!is_camera_frame(&beam));
     }
 
     #[test]
