@@ -4,7 +4,9 @@ use super::point_shape::{PointShape, Structure, is_line, is_surface};
 use crate::math::{DVec3, SymmetricMatrix, Vec3, median, smallest_eigenvector};
 use crate::points::PointCloud;
 use crate::points::normals::planes::PlaneFit;
+use crate::points::scan::scan_rings::ScanRings;
 use crate::points::up::is_mostly_land;
+use crate::progress::NoProgress;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -23,11 +25,14 @@ const MIN_IN_CELL: u32 = 12;
 const MIN_SCATTERED_CROWN: f32 = 0.7;
 /// Minimum number of scattered points within crowns.
 const MIN_CROWN: u32 = 2000;
+/// Minimum number and fraction of scattered points in the scan of a street. Corridors have a fraction of 0.02.
+const MIN_IN_STREET: usize = 500;
+const MIN_FRACTION_IN_STREET: f32 = 0.05;
 /// ASPRS classes of low, medium and high vegetation.
 const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 
 /// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
-/// file calls vegetation, those on land, those in crowns, and those of clouds with much of them. Without such classes the
+/// file calls vegetation, those on land, those in crowns, those of a spinning scanner, and those of clouds with much of them. Without such classes the
 /// points of a cloud that are all scattered stand for themselves.
 pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
@@ -44,7 +49,16 @@ pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
             || is_mostly_land(&cloud.positions)
             || !is_much(n_scattered, structures.len())
                 && MIN_CROWN as usize <= n_scattered
-                && has_crowns(cloud, structures))
+                && has_crowns(cloud, structures)
+            || is_street_scan(cloud, n_scattered))
+}
+
+/// Returns true if a cloud with scattered points is that of a spinning scanner, as on vehicles: its few rings in the trees of a
+/// street make no crowns.
+fn is_street_scan(cloud: &PointCloud, n_scattered: usize) -> bool {
+    let is_enough = MIN_IN_STREET <= n_scattered
+        && MIN_FRACTION_IN_STREET * cloud.len() as f32 <= n_scattered as f32;
+    is_enough && matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)))
 }
 
 /// Returns true if most of the scattered points, without those that lie alone, are in crowns: at least seven of ten points
@@ -146,6 +160,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use std::f32::consts::TAU;
 
     /// Returns points in a box, of which the first are scattered.
     fn cloud(n_points: usize, n_scattered: usize, size: Vec3) -> (PointCloud, Vec<Structure>) {
@@ -211,6 +226,30 @@ mod tests {
             let mut structures = vec![Structure::Surface; cloud.len()];
             structures[wall.len()..].fill(Structure::Scatter);
             assert_eq!(has_leaves(&cloud, &structures), expected, "{n_scattered}");
+        }
+    }
+
+    #[test]
+    fn scattered_points_of_a_spinning_scanner_are_leaves() {
+        // Sixteen rings in a yard with four piers before its round wall; or the same points at any elevation.
+        let mut random = Random::new(6, 0);
+        let mut cloud = |has_rings: bool| {
+            let point = |i: usize| {
+                let (ring, column) = (i / 1000, i % 1000);
+                let (sin, cos) = (TAU * column as f32 / 1000.0).sin_cos();
+                let at = if has_rings { ring as f32 } else { 16.0 * random.next_f32() };
+                let range = if column % 250 < 25 { 6.0 } else { 20.0 };
+                range * Vec3::new(cos, sin, (2.0 * at - 15.0).to_radians().tan())
+            };
+            PointCloud::from_positions((0..16_000).map(point).collect())
+        };
+        for (has_rings, n_scattered, expected) in
+            [(true, 900, true), (true, 700, false), (false, 900, false)]
+        {
+            let mut structures = vec![Structure::Surface; 16_000];
+            structures[..n_scattered].fill(Structure::Scatter);
+            let found = has_leaves(&cloud(has_rings), &structures);
+            assert_eq!(found, expected, "{has_rings} {n_scattered}");
         }
     }
 
