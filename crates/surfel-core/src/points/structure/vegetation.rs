@@ -32,8 +32,8 @@ const MIN_FRACTION_IN_STREET: f32 = 0.05;
 const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 
 /// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
-/// file calls vegetation, those on land, those in crowns, those of a spinning scanner, and those of clouds with much of them. Without such classes the
-/// points of a cloud that are all scattered stand for themselves.
+/// file calls vegetation, those on land, those in crowns, those of a spinning scanner, and those of clouds with much of
+/// them. Without such classes the points of a cloud that are all scattered stand for themselves.
 pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
     let n_scattered = structures.iter().filter(|structure| is_scattered(structure)).count();
@@ -44,17 +44,16 @@ pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
     if 0 < n_plants && is_much(n_plants, n_scattered) {
         return true;
     }
+    let are_plants = || match is_much(n_scattered, structures.len()) {
+        true => MIN_LEAVES <= n_scattered,
+        false => MIN_CROWN as usize <= n_scattered && has_crowns(cloud, structures),
+    };
     n_scattered < structures.len()
-        && (MIN_LEAVES <= n_scattered && is_much(n_scattered, structures.len())
-            || is_mostly_land(&cloud.positions)
-            || !is_much(n_scattered, structures.len())
-                && MIN_CROWN as usize <= n_scattered
-                && has_crowns(cloud, structures)
-            || is_street_scan(cloud, n_scattered))
+        && (is_mostly_land(&cloud.positions) || are_plants() || is_street_scan(cloud, n_scattered))
 }
 
-/// Returns true if a cloud with scattered points is that of a spinning scanner, as on vehicles: its few rings in the trees of a
-/// street make no crowns.
+/// Returns true if a cloud with scattered points is that of a spinning scanner, as on vehicles: its few rings in the trees
+/// of a street make no crowns.
 fn is_street_scan(cloud: &PointCloud, n_scattered: usize) -> bool {
     let is_enough = MIN_IN_STREET <= n_scattered
         && MIN_FRACTION_IN_STREET * cloud.len() as f32 <= n_scattered as f32;
