@@ -126,7 +126,7 @@ impl FlatCloud {
             points,
             lines,
             scatter,
-            has_leaves: geometry.has_leaves(),
+            has_leaves: geometry.cloud().has_leaves(),
             field: Box::default(),
             octree: Box::default(),
             gaussians: Box::default(),
@@ -275,7 +275,7 @@ fn parts<'a>(columns: PointColumns<'a>, geometry: &'a CloudGeometry) -> Option<P
     Some(Parts {
         surface: part(geometry.surface, Structure::Surface),
         lines: part(SurfaceKind::Capsule, Structure::Line),
-        scatter: part(scatter_kind(geometry.has_leaves()), Structure::Scatter),
+        scatter: part(scatter_kind(geometry.cloud().has_leaves()), Structure::Scatter),
     })
 }
 

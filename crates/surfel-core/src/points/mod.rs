@@ -73,6 +73,5 @@ pub use structure::point_shape::{
     PointShape, STRUCTURE, Structure, StructureChoice, StructureReport,
 };
 pub use structure::solids::CAPSULE_ASPECT;
-pub use structure::vegetation::has_leaves;
 pub(crate) use up::CameraAxes;
 pub use up::{InferredUp, UpConvention, infer_up};

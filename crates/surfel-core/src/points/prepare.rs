@@ -19,7 +19,6 @@ use super::scan::scan_rings::ScanRings;
 use super::select_points::{Selection, select};
 use super::structure::elevation_grid::elevation_grid;
 use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
-use super::structure::vegetation::has_leaves;
 use super::{PointCloud, PreparedCloud};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -138,11 +137,17 @@ pub fn prepare(
     }
     if let Some((shapes, found)) = shapes {
         add_structures(&mut cloud, &shapes);
-        let has_leaves = cloud.structures().is_some_and(|all| has_leaves(&cloud, &all));
-        report.structure = Some(StructureReport { has_leaves, ..found });
+        report.structure = Some(found);
     }
     add_morph_offsets(&mut cloud, &estimated, preparation, progress)?;
-    Ok((PreparedCloud::new(cloud)?, report))
+    let cloud = match missing.fits {
+        true => PreparedCloud::with_rings(cloud, |_| rings.is_some())?,
+        false => PreparedCloud::new(cloud)?,
+    };
+    if let Some(found) = &mut report.structure {
+        found.has_leaves = cloud.has_leaves();
+    }
+    Ok((cloud, report))
 }
 
 /// Reports the rings of a spinning scanner and the grid of elevations that the search for structures follows.

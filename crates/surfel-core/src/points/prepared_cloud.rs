@@ -1,9 +1,12 @@
 //! Prepared clouds, whose type guarantees that they can be traced.
 
 use super::normals::orient::has_stations;
+use super::scan::scan_rings::ScanRings;
+use super::structure::vegetation::has_leaves;
 use super::{PointCloud, check_count, is_valid_position};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
+use crate::progress::NoProgress;
 use rayon::prelude::*;
 use std::ops::Deref;
 
@@ -13,6 +16,7 @@ use std::ops::Deref;
 pub struct PreparedCloud {
     /// Invariant: the cloud has radii, one entry for each point in every column, and only valid positions.
     cloud: PointCloud,
+    has_leaves: bool,
 }
 
 impl PreparedCloud {
@@ -24,6 +28,22 @@ impl PreparedCloud {
     /// have one entry for each point, [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::InvalidPosition`] for a
     /// position that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
     pub fn new(cloud: PointCloud) -> Result<Self> {
+        let has_rings = |cloud: &PointCloud| {
+            matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)))
+        };
+        Self::with_rings(cloud, has_rings)
+    }
+
+    /// Wraps a cloud that can be traced as it is. `has_rings` tells whether its points are on the rings of a spinning
+    /// scanner; it is asked only if that decides what scattered points are.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PreparedCloud::new`].
+    pub(super) fn with_rings(
+        cloud: PointCloud,
+        has_rings: impl FnOnce(&PointCloud) -> bool,
+    ) -> Result<Self> {
         check_count(cloud.len())?;
         if cloud.radii.is_none() {
             return Err(Error::MissingColumn { column: "radii" });
@@ -33,14 +53,20 @@ impl PreparedCloud {
         }
         match cloud.positions.par_iter().position_first(|p| !is_valid_position(*p)) {
             Some(point_idx) => Err(Error::InvalidPosition { point_idx }),
-            None => Ok(Self { cloud }),
+            None => {
+                let structures = cloud.structures();
+                let has_leaves =
+                    structures.is_some_and(|all| has_leaves(&cloud, &all, || has_rings(&cloud)));
+                Ok(Self { cloud, has_leaves })
+            }
         }
     }
 
     /// Creates a cloud without points about an origin.
     pub fn empty(origin: DVec3) -> Self {
         let (normals, radii) = (Some(Vec::new()), Some(Vec::new()));
-        Self { cloud: PointCloud { origin, normals, radii, ..PointCloud::default() } }
+        let cloud = PointCloud { origin, normals, radii, ..PointCloud::default() };
+        Self { cloud, has_leaves: false }
     }
 
     /// Returns the positions relative to the cloud's origin.
@@ -56,6 +82,11 @@ impl PreparedCloud {
     /// Returns true if the positions of all stations are known, toward which normals are turned.
     pub fn has_stations(&self) -> bool {
         has_stations(&self.cloud)
+    }
+
+    /// Returns true if scattered points are leaves; false if each is a ball.
+    pub fn has_leaves(&self) -> bool {
+        self.has_leaves
     }
 
     /// Returns the radii in world units, one for each position.
@@ -75,9 +106,10 @@ impl PreparedCloud {
         self.cloud.scalars.retain(|scalar| !names.contains(&scalar.name.as_str()));
     }
 
-    /// Returns the points at `indices`, in that order, with all their columns.
+    /// Returns the points at `indices`, in that order, with all their columns. Scattered points stay what they were in the
+    /// whole cloud, leaves or balls.
     pub fn subset(&self, indices: &[u32]) -> Self {
-        Self { cloud: self.cloud.subset(indices) }
+        Self { cloud: self.cloud.subset(indices), has_leaves: self.has_leaves }
     }
 
     /// Unwraps the cloud, for changes that [`PreparedCloud::new`] checks again.
@@ -116,7 +148,7 @@ mod tests {
     //! Checks of the columns that tracing needs.
 
     use super::*;
-    use crate::points::{Scalar, Skin, Values};
+    use crate::points::{STRUCTURE, Scalar, Skin, Structure, Values};
 
     fn cloud() -> PointCloud {
         PointCloud {
@@ -136,6 +168,25 @@ mod tests {
         assert!(PreparedCloud::new(PreparedCloud::default().into_inner()).is_ok());
         let bare = PreparedCloud::new(PointCloud { normals: None, ..cloud() }).unwrap();
         assert!(bare.normals().is_empty());
+    }
+
+    #[test]
+    fn what_scattered_points_are_follows_the_known_rings_and_stays_in_a_subset() {
+        let n_points = 5000;
+        let structures = (0..n_points).map(|i| u8::from(i < 900) * Structure::Scatter as u8);
+        let structure =
+            Scalar { name: STRUCTURE.into(), values: Values::U8(structures.collect()) };
+        let cloud = PointCloud {
+            radii: Some(vec![0.5; n_points]),
+            scalars: vec![structure],
+            ..PointCloud::from_positions(vec![Vec3::ZERO; n_points])
+        };
+        for has_rings in [true, false] {
+            let prepared = PreparedCloud::with_rings(cloud.clone(), |_| has_rings).unwrap();
+            assert_eq!(prepared.has_leaves(), has_rings);
+            assert_eq!(prepared.subset(&[3]).has_leaves(), has_rings);
+        }
+        assert!(!PreparedCloud::new(cloud).unwrap().has_leaves());
     }
 
     #[test]

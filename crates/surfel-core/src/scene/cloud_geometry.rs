@@ -2,7 +2,7 @@
 
 use super::color::SupportColors;
 use crate::error::Result;
-use crate::points::{PointCloud, PreparedCloud, Structure, check_length, has_leaves};
+use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
 use crate::surface::{EdgeTest, OctreeDepth, SurfaceKind, SurfaceOptions};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
@@ -13,8 +13,6 @@ pub struct CloudGeometry {
     colors: Vec<[u8; 3]>,
     /// The structure of each point; none if all are part of a surface.
     structures: Option<Vec<Structure>>,
-    /// True if scattered points are leaves; false if each is a ball.
-    has_leaves: bool,
     /// The surface that the points describe.
     pub surface: SurfaceKind,
     /// Options of that surface.
@@ -45,7 +43,6 @@ impl Default for CloudGeometry {
             cloud: PreparedCloud::default(),
             colors: Vec::new(),
             structures: None,
-            has_leaves: false,
             surface: SurfaceKind::default(),
             options: SurfaceOptions::default(),
             edge_test: EdgeTest::default(),
@@ -79,13 +76,7 @@ impl CloudGeometry {
 
     fn without_colors(cloud: PreparedCloud) -> Self {
         let structures = structures(&cloud);
-        let has_leaves = structures.as_ref().is_some_and(|all| has_leaves(&cloud, all));
-        Self { structures, has_leaves, cloud, ..Self::default() }
-    }
-
-    /// Returns true if scattered points are leaves; false if each is a ball.
-    pub fn has_leaves(&self) -> bool {
-        self.has_leaves
+        Self { structures, cloud, ..Self::default() }
     }
 
     /// Returns the structure of each point, or none if all points are part of the surface.
@@ -104,7 +95,7 @@ impl CloudGeometry {
         &self.colors
     }
 
-    /// Keeps the points at `indices`, in that order. Scattered points stay what they were in the whole cloud, leaves or balls.
+    /// Keeps the points at `indices`, in that order.
     pub(super) fn retain(&mut self, indices: &[u32]) {
         self.cloud = self.cloud.subset(indices);
         self.structures = structures(&self.cloud);

@@ -82,7 +82,7 @@ fn cloud_hash(geometry: &CloudGeometry) -> u64 {
         (
             (geometry.surface, geometry.options, geometry.edge_test, geometry.octree_depth),
             (geometry.blends_colors, geometry.support_colors, geometry.shows_trained_colors),
-            (geometry.has_outward_normals, geometry.has_front_sides, geometry.has_leaves()),
+            (geometry.has_outward_normals, geometry.has_front_sides, geometry.cloud().has_leaves()),
         )
     );
     let mut hasher = DefaultHasher::new();

@@ -4,9 +4,7 @@ use super::point_shape::{PointShape, Structure, is_line, is_surface};
 use crate::math::{DVec3, SymmetricMatrix, Vec3, median, smallest_eigenvector};
 use crate::points::PointCloud;
 use crate::points::normals::planes::PlaneFit;
-use crate::points::scan::scan_rings::ScanRings;
 use crate::points::up::is_mostly_land;
-use crate::progress::NoProgress;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -34,7 +32,12 @@ const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 /// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
 /// file calls vegetation, those on land, those in crowns, those of a spinning scanner, and those of clouds with much of
 /// them. Without such classes the points of a cloud that are all scattered stand for themselves.
-pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
+/// `has_rings` tells whether the points are on the rings of a spinning scanner.
+pub fn has_leaves(
+    cloud: &PointCloud,
+    structures: &[Structure],
+    has_rings: impl FnOnce() -> bool,
+) -> bool {
     let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
     let n_scattered = structures.iter().filter(|structure| is_scattered(structure)).count();
     let n_plants = cloud.classification.as_deref().map_or(0, |classes| {
@@ -48,16 +51,15 @@ pub fn has_leaves(cloud: &PointCloud, structures: &[Structure]) -> bool {
         true => MIN_LEAVES <= n_scattered,
         false => MIN_CROWN as usize <= n_scattered && has_crowns(cloud, structures),
     };
-    n_scattered < structures.len()
-        && (is_mostly_land(&cloud.positions) || are_plants() || is_street_scan(cloud, n_scattered))
-}
-
-/// Returns true if a cloud with scattered points is that of a spinning scanner, as on vehicles: its few rings in the trees
-/// of a street make no crowns.
-fn is_street_scan(cloud: &PointCloud, n_scattered: usize) -> bool {
-    let is_enough = MIN_IN_STREET <= n_scattered
-        && MIN_FRACTION_IN_STREET * cloud.len() as f32 <= n_scattered as f32;
-    is_enough && matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)))
+    // A spinning scanner, as on vehicles, has so few rings in the trees of a street that they make no crowns.
+    let is_street_scan = || {
+        MIN_IN_STREET <= n_scattered
+            && MIN_FRACTION_IN_STREET * cloud.len() as f32 <= n_scattered as f32
+            && has_rings()
+    };
+    let some_are_scattered = 0 < n_scattered && n_scattered < structures.len();
+    some_are_scattered
+        && (is_mostly_land(&cloud.positions) || are_plants() || is_street_scan())
 }
 
 /// Returns true if most of the scattered points, without those that lie alone, are in crowns: at least seven of ten points
@@ -159,7 +161,6 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use std::f32::consts::TAU;
 
     /// Returns points in a box, of which the first are scattered.
     fn cloud(n_points: usize, n_scattered: usize, size: Vec3) -> (PointCloud, Vec<Structure>) {
@@ -187,7 +188,7 @@ mod tests {
             (2000, 20, Vec3::new(200.0, 200.0, 8.0), true),
         ] {
             let (cloud, structures) = cloud(n_points, n_scattered, size);
-            assert_eq!(has_leaves(&cloud, &structures), expected, "{n_scattered} of {n_points}");
+            assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{n_scattered} of {n_points}");
         }
     }
 
@@ -197,7 +198,7 @@ mod tests {
             let (mut cloud, structures) = cloud(100, n_scattered, Vec3::ONE);
             for (class, expected) in [(2, false), (3, true), (5, true), (6, false)] {
                 cloud.classification = Some([vec![class; 20], vec![1; 80]].concat());
-                assert_eq!(has_leaves(&cloud, &structures), expected, "{class}");
+                assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{class}");
             }
         }
     }
@@ -206,7 +207,7 @@ mod tests {
     fn vegetation_elsewhere_makes_no_leaves() {
         let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
         cloud.classification = Some([vec![6; 49], vec![5; 51]].concat());
-        assert!(!has_leaves(&cloud, &structures));
+        assert!(!has_leaves(&cloud, &structures, || false));
     }
 
     #[test]
@@ -224,30 +225,19 @@ mod tests {
             cloud.radii = Some(vec![0.08; cloud.len()]);
             let mut structures = vec![Structure::Surface; cloud.len()];
             structures[wall.len()..].fill(Structure::Scatter);
-            assert_eq!(has_leaves(&cloud, &structures), expected, "{n_scattered}");
+            assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{n_scattered}");
         }
     }
 
     #[test]
     fn scattered_points_of_a_spinning_scanner_are_leaves() {
-        // Sixteen rings in a yard with four piers before its round wall; or the same points at any elevation.
-        let mut random = Random::new(6, 0);
-        let mut cloud = |has_rings: bool| {
-            let point = |i: usize| {
-                let (ring, column) = (i / 1000, i % 1000);
-                let (sin, cos) = (TAU * column as f32 / 1000.0).sin_cos();
-                let at = if has_rings { ring as f32 } else { 16.0 * random.next_f32() };
-                let range = if column % 250 < 25 { 6.0 } else { 20.0 };
-                range * Vec3::new(cos, sin, (2.0 * at - 15.0).to_radians().tan())
-            };
-            PointCloud::from_positions((0..16_000).map(point).collect())
-        };
+        let cloud = PointCloud::from_positions(vec![Vec3::ZERO; 16_000]);
         for (has_rings, n_scattered, expected) in
             [(true, 900, true), (true, 700, false), (false, 900, false)]
         {
             let mut structures = vec![Structure::Surface; 16_000];
             structures[..n_scattered].fill(Structure::Scatter);
-            let found = has_leaves(&cloud(has_rings), &structures);
+            let found = has_leaves(&cloud, &structures, || has_rings);
             assert_eq!(found, expected, "{has_rings} {n_scattered}");
         }
     }
