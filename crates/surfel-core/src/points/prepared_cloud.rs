@@ -28,9 +28,8 @@ impl PreparedCloud {
     /// have one entry for each point, [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::InvalidPosition`] for a
     /// position that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
     pub fn new(cloud: PointCloud) -> Result<Self> {
-        let has_rings = |cloud: &PointCloud| {
-            matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)))
-        };
+        let has_rings =
+            |cloud: &PointCloud| matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)));
         Self::with_rings(cloud, has_rings)
     }
 
@@ -174,8 +173,7 @@ mod tests {
     fn what_scattered_points_are_follows_the_known_rings_and_stays_in_a_subset() {
         let n_points = 5000;
         let structures = (0..n_points).map(|i| u8::from(i < 900) * Structure::Scatter as u8);
-        let structure =
-            Scalar { name: STRUCTURE.into(), values: Values::U8(structures.collect()) };
+        let structure = Scalar { name: STRUCTURE.into(), values: Values::U8(structures.collect()) };
         let cloud = PointCloud {
             radii: Some(vec![0.5; n_points]),
             scalars: vec![structure],

@@ -6,9 +6,9 @@ use crate::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use surfel_core::Result;
-use surfel_core::math::DVec3;
 use surfel_core::math::Random;
-use surfel_core::points::PointCloud;
+use surfel_core::math::{DMat3, DQuat, DVec3};
+use surfel_core::points::{PointCloud, ScanStation};
 use surfel_core::progress::Progress;
 
 /// A depth camera and the poses that it is held in.
@@ -24,6 +24,8 @@ pub struct DepthCamera {
     pub view_angle_rad: f64,
     /// Standard deviation of a depth of one metre, in metres.
     pub noise_at_1_m: f64,
+    /// Width in pixels of the windows by which disparities are measured; noise in pixels nearer than that is alike.
+    pub window: usize,
     /// Step between depths at one metre, in metres; it grows with the square of the depth, as that of disparities.
     pub step_at_1_m: f64,
     /// Maximum depth in metres.
@@ -41,6 +43,7 @@ impl Default for DepthCamera {
             height: 240,
             view_angle_rad: 48f64.to_radians(),
             noise_at_1_m: 0.0012,
+            window: 1,
             step_at_1_m: 0.0008,
             max_depth: 8.0,
             seed: 1,
@@ -55,6 +58,13 @@ fn axes((position, target): (DVec3, DVec3)) -> [DVec3; 3] {
     [right, right.cross(ahead), ahead]
 }
 
+/// Returns the station of a pose, whose axes are those of computer vision: X to the right, Y down, Z ahead.
+fn station(pose: (DVec3, DVec3)) -> ScanStation {
+    let [right, up, ahead] = axes(pose);
+    let rotation = DQuat::from_mat3(&DMat3::from_cols(right, -up, ahead));
+    ScanStation { position: Some(pose.0), rotation, ..ScanStation::default() }
+}
+
 impl DepthCamera {
     fn scan_row(&self, scene: &SdfScene, pose_idx: usize, y: usize) -> Vec<Return> {
         let pose = self.poses[pose_idx];
@@ -67,17 +77,28 @@ impl DepthCamera {
             let ray = DRay { origin: pose.0, direction };
             let cosine = direction.dot(ahead);
             let hit = scene.first_hit(&ray, self.max_depth / cosine)?;
-            let stream = ((pose_idx as u64) << 40) | (y * self.width + x) as u64;
-            let mut random = Random::new(self.seed, stream);
-            let range = self.measured(hit.distance * cosine, &mut random) / cosine;
+            let noise = self.noise(pose_idx, x, y);
+            let range = self.measured(hit.distance * cosine, noise) / cosine;
             Some(Return::new(scene, &ray, hit, range, pose_idx as u16 + 1))
         };
         (0..self.width).filter_map(scan_pixel).collect()
     }
 
+    /// Returns noise of a standard deviation of 1.
+    fn noise(&self, pose_idx: usize, x: usize, y: usize) -> f64 {
+        let of_pixel = |x: usize, y: usize| {
+            let pixel = y * (self.width + self.window - 1) + x;
+            Random::new(self.seed, ((pose_idx as u64) << 40) | pixel as u64).next_gaussian()
+        };
+        let rows = y..y + self.window;
+        let sum: f64 =
+            rows.map(|y| (x..x + self.window).map(|x| of_pixel(x, y)).sum::<f64>()).sum();
+        sum / self.window as f64
+    }
+
     /// Adds noise to a depth and rounds its reciprocal.
-    fn measured(&self, depth: f64, random: &mut Random) -> f64 {
-        let noisy = depth + self.noise_at_1_m * depth * depth * random.next_gaussian();
+    fn measured(&self, depth: f64, noise: f64) -> f64 {
+        let noisy = depth + self.noise_at_1_m * depth * depth * noise;
         let disparity = 1.0 / noisy.max(1e-3);
         if self.step_at_1_m == 0.0 {
             return noisy;
@@ -87,12 +108,13 @@ impl DepthCamera {
 }
 
 impl Instrument for DepthCamera {
-    /// Returns points ordered by picture, row and column.
+    /// Returns points ordered by picture, row and column. Those of one pose know their station.
     fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
         let is_angle = 0.0 < self.view_angle_rad && self.view_angle_rad < PI;
         check(is_angle, "view_angle_rad", self.view_angle_rad, "between 0 and pi")?;
         check_not_negative("noise_at_1_m", self.noise_at_1_m)?;
         check_not_negative("step_at_1_m", self.step_at_1_m)?;
+        check_positive("window", self.window as f64)?;
         for (position, target) in &self.poses {
             let level = (target - position).truncate().length();
             check(0.0 < level, "direction of a pose", level, "one that is not vertical")?;
@@ -112,7 +134,11 @@ impl Instrument for DepthCamera {
         let rows: Vec<Vec<Return>> =
             (0..n_rows).into_par_iter().map(scan_row).collect::<Result<_>>()?;
         let returns: Vec<Return> = rows.into_iter().flatten().collect();
-        Ok(into_cloud(&returns, DVec3::ZERO))
+        let mut cloud = into_cloud(&returns, DVec3::ZERO);
+        if let [pose] = self.poses[..] {
+            cloud.stations = vec![station(pose)];
+        }
+        Ok(cloud)
     }
 
     fn viewpoints(&self, point: DVec3) -> Vec<DVec3> {

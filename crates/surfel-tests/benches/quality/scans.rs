@@ -30,7 +30,7 @@ struct ScanCase {
     instrument: Box<dyn Instrument>,
 }
 
-fn all_scans() -> [ScanCase; 9] {
+fn all_scans() -> [ScanCase; 10] {
     fn case(
         name: &'static str,
         title: &'static str,
@@ -58,6 +58,7 @@ fn all_scans() -> [ScanCase; 9] {
         ),
         case("forest-airborne", "Forest, airborne", forest::scene, forest::airborne()),
         case("room-terrestrial", "Room, terrestrial", room::scene, room::terrestrial(STEP_DEG)),
+        case("room-depth-image", "Room, depth image", room::scene, room::depth_image()),
         case("room-depth-camera", "Room, depth camera", room::scene, room::depth_camera()),
         case(
             "ruin-terrestrial",

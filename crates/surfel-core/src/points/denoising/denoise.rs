@@ -4,7 +4,8 @@
 //! edges (bilateral filter), and each point moves along its normal onto the weighted mean of its neighbours' planes
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
-use super::depth_steps::DepthSteps;
+use super::depth_camera::DepthCamera;
+use super::depth_image::smooth_depths;
 use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::Noise;
 use super::noise_at_point::{GROUP_SIZE, LocalFit};
@@ -103,13 +104,37 @@ pub fn denoise(
     if is_animated || choice == Denoise::Off || (is_auto && cloud.radii.is_some()) {
         return Ok(None);
     }
+    let measured = cloud.positions.clone();
+    let depth_noise = match DepthCamera::find(cloud) {
+        Some(camera) => smooth_depths(&mut cloud.positions, &camera, progress)?,
+        None => None,
+    };
+    let found = denoise_surfaces(cloud, is_auto, progress)?;
+    let (noise, normals) = match (depth_noise, found) {
+        (None, None) => return Ok(None),
+        (Some(noise), None) => (noise, vec![Vec3::ZERO; measured.len()]),
+        (depth_noise, Some((noise, normals))) => (depth_noise.unwrap_or(noise), normals),
+    };
+    let moves = measured.iter().zip(&cloud.positions);
+    let sum: f64 = moves.clone().map(|(from, to)| f64::from(from.distance(*to))).sum();
+    let n_moved = moves.filter(|(from, to)| from != to).count();
+    let mean_distance = (sum / n_moved.max(1) as f64) as f32;
+    Ok(Some(Denoised { report: DenoiseReport { noise, n_moved, mean_distance }, normals }))
+}
+
+/// Moves points onto the surface of their neighbours. Returns the median noise in spacings with the normals of
+/// [`Denoised`], or none if the points stay.
+fn denoise_surfaces(
+    cloud: &mut PointCloud,
+    is_auto: bool,
+    progress: &dyn Progress,
+) -> Result<Option<(f32, Vec<Vec3>)>> {
     let positions = &cloud.positions;
     let tree = KdTree::new(positions, progress)?;
     let order = tree.order();
     let means = means_of_groups(positions, &order);
     let groups = KdTree::new(&means, progress)?;
-    let steps = DepthSteps::find(cloud);
-    let noise = Noise::new(&tree, &groups, &order, steps.as_ref(), progress)?;
+    let noise = Noise::new(&tree, &groups, &order, progress)?;
     if is_auto && (noise.median() < MIN_NOISE || !noise.has_surfaces()) {
         return Ok(None);
     }
@@ -138,14 +163,8 @@ pub fn denoise(
         moved_points[*point as usize] = position;
         normals[*point as usize] = normal;
     }
-    let distances =
-        positions.iter().zip(&moved_points).map(|(from, to)| f64::from(from.distance(*to)));
-    let sum: f64 = distances.sum();
-    let n_moved = positions.iter().zip(&moved_points).filter(|(from, to)| from != to).count();
-    let mean_distance = (sum / n_moved.max(1) as f64) as f32;
     cloud.positions = moved_points;
-    let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
-    Ok(Some(Denoised { report, normals }))
+    Ok(Some((noise.median(), normals)))
 }
 
 /// Returns the means of groups of points that follow each other in `order`.

@@ -1,9 +1,10 @@
-//! Denoising: the noise of a cloud, the depth steps of a depth camera, and the points moved onto their surface or onto the axis
-//! of their line.
+//! Denoising: the noise of a cloud, and the points moved onto their surface or onto the axis of their line; those of a depth
+//! camera in its image first.
 //!
 //! A file uses only those above it.
 
-pub mod depth_steps;
+pub mod depth_camera;
+pub mod depth_image;
 pub mod flat_faces;
 pub mod noise_at_point;
 pub mod noise;

@@ -2,11 +2,10 @@
 //!
 //! The noise is measured at some points of each region.
 
-use super::depth_steps::DepthSteps;
-use super::noise_at_point::{GROUP_SIZE, LocalFit, MIN_NOISE_NEIGHBORS, NoiseAtPoint, reach_at};
+use super::noise_at_point::{GROUP_SIZE, LocalFit, NoiseAtPoint, reach_at};
 use crate::error::Result;
 use crate::math::{Vec3, median, quantile};
-use crate::points::neighbors::{KdTree, Neighbor, spacing_per_reach};
+use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::normals::planes::fit_plane;
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -43,9 +42,6 @@ const MIN_KNOWN_OF_SLAB: f32 = 0.5;
 const MAX_SLAB_VARIATION: f32 = 0.03;
 /// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised.
 const MIN_SURFACE_REGIONS: f32 = 0.1;
-/// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
-/// that a plane must reach over several steps: at half a step, walls across the view stayed in patches.
-const NOISE_PER_STEP: f32 = 1.0;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
 
@@ -64,7 +60,7 @@ pub struct Noise {
 
 impl Noise {
     /// Measures the noise. `order` lists the points so that those near each other follow each other, and `groups` are the
-    /// means of each [`GROUP_SIZE`] of them. `steps` are those of a depth camera.
+    /// means of each [`GROUP_SIZE`] of them.
     ///
     /// # Errors
     ///
@@ -73,7 +69,6 @@ impl Noise {
         tree: &KdTree,
         groups: &KdTree,
         order: &[u32],
-        steps: Option<&DepthSteps>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let [least, most] = REGION_SIZES;
@@ -82,7 +77,7 @@ impl Noise {
         let measure = |points: &[u32]| {
             progress.check()?;
             progress.advance(points.len() as u64);
-            Ok(Region::new(tree, groups, points, steps))
+            Ok(Region::new(tree, groups, points))
         };
         let regions = order.par_chunks(size).map(measure).collect::<Result<Vec<_>>>()?;
         let count = |of: fn(&Region) -> usize| regions.iter().map(of).sum::<usize>() as f32;
@@ -214,17 +209,12 @@ struct Region {
 }
 
 impl Region {
-    fn new(tree: &KdTree, groups: &KdTree, points: &[u32], steps: Option<&DepthSteps>) -> Self {
+    fn new(tree: &KdTree, groups: &KdTree, points: &[u32]) -> Self {
         let step = points.len().div_ceil(N_SAMPLES).max(1);
         let samples: Vec<NoiseAtPoint> = points
             .iter()
             .step_by(step)
-            .map(|point| match NoiseAtPoint::new(tree, groups, *point) {
-                NoiseAtPoint::Known(noise) => {
-                    NoiseAtPoint::Known(noise.max(noise_by_steps(tree, *point, steps)))
-                }
-                unknown => unknown,
-            })
+            .map(|point| NoiseAtPoint::new(tree, groups, *point))
             .collect();
         let noise = |sample: &NoiseAtPoint| match sample {
             NoiseAtPoint::Known(noise) => Some(*noise),
@@ -268,16 +258,6 @@ impl Region {
     }
 }
 
-/// Returns the noise that the steps of a depth camera stand for, in spacings. They are terraces wider than the
-/// neighbourhoods in which the noise is told, so that they do not count there.
-fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 {
-    let Some(steps) = steps else { return 0.0 };
-    let position = tree.positions()[point as usize];
-    let reach = reach_at(tree, point);
-    let spacing = spacing_per_reach(MIN_NOISE_NEIGHBORS as f32) * reach;
-    NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
-}
-
 #[cfg(test)]
 mod tests {
     //! Points of different noise on one plane.
@@ -305,7 +285,7 @@ mod tests {
     fn noisy_fraction(points: &[Vec3], is_asked: impl Fn(&Vec3) -> bool) -> f64 {
         let tree = KdTree::new(points, &NoProgress).unwrap();
         let order = tree.order();
-        let noise = Noise::new(&tree, &tree, &order, None, &NoProgress).unwrap();
+        let noise = Noise::new(&tree, &tree, &order, &NoProgress).unwrap();
         let sorted: Vec<Vec3> = order.iter().map(|point| points[*point as usize]).collect();
         let tree = KdTree::new(&sorted, &NoProgress).unwrap();
         let fits = LocalFit::of_points(&tree, &NoProgress).unwrap();

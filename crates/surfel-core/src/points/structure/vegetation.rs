@@ -58,8 +58,7 @@ pub fn has_leaves(
             && has_rings()
     };
     let some_are_scattered = 0 < n_scattered && n_scattered < structures.len();
-    some_are_scattered
-        && (is_mostly_land(&cloud.positions) || are_plants() || is_street_scan())
+    some_are_scattered && (is_mostly_land(&cloud.positions) || are_plants() || is_street_scan())
 }
 
 /// Returns true if most of the scattered points, without those that lie alone, are in crowns: at least seven of ten points
@@ -188,7 +187,11 @@ mod tests {
             (2000, 20, Vec3::new(200.0, 200.0, 8.0), true),
         ] {
             let (cloud, structures) = cloud(n_points, n_scattered, size);
-            assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{n_scattered} of {n_points}");
+            assert_eq!(
+                has_leaves(&cloud, &structures, || false),
+                expected,
+                "{n_scattered} of {n_points}"
+            );
         }
     }
 

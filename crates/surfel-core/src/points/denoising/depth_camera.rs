@@ -1,4 +1,4 @@
-//! Depth steps: a depth camera rounds the depths that it measures, far ones to steps of centimetres.
+//! The depth camera that measured a cloud, and the steps to which it rounds depths: far ones to centimetres.
 //!
 //! A slanted surface then consists of terraces, each of them even. Depths are recognised as an axis of the camera along
 //! which points have few different coordinates, while they have many along the others.
@@ -20,25 +20,29 @@ const ROUNDING: f32 = 1e-6;
 /// Number of depths before and behind one that its step is averaged over.
 const N_AVERAGED: usize = 3;
 
-/// The depths to which a camera rounds.
-pub struct DepthSteps {
-    axis: Vec3,
-    /// Coordinates along the axis in ascending order.
+/// The depth camera of a cloud.
+pub struct DepthCamera {
+    /// Position relative to the origin of the cloud.
+    pub position: Vec3,
+    /// Direction of the view. Both axes of the image are perpendicular to it.
+    ahead: Vec3,
+    image_axes: [Vec3; 2],
+    /// The depths to which the camera rounds, in ascending order.
     depths: Vec<f32>,
 }
 
-impl DepthSteps {
-    /// Returns the depths of a cloud of one depth camera, none of other clouds.
+impl DepthCamera {
+    /// Returns the camera of a cloud of one depth camera, none of other clouds.
     pub fn find(cloud: &PointCloud) -> Option<Self> {
         let n_points = cloud.len();
         if n_points < MIN_POINTS {
             return None;
         }
-        let (rotation, camera) = match &cloud.stations[..] {
+        let (rotation, position) = match &cloud.stations[..] {
             [station] => (station.rotation.as_quat(), station.position.unwrap_or_default()),
             _ => Default::default(),
         };
-        let camera = (camera - cloud.origin).as_vec3();
+        let position = (position - cloud.origin).as_vec3();
         let mut random = Random::new(0, 0);
         let mut sample = || cloud.positions[random.below(n_points as u64) as usize];
         let sample: Vec<Vec3> = (0..n_points.min(N_SAMPLES)).map(|_| sample()).collect();
@@ -54,19 +58,33 @@ impl DepthSteps {
         // Flight lines have few coordinates along the flight as well.
         let [x, y, ahead] = [1, 2, 3].map(|step| axes[(depth + step) % 3]);
         let seen = |point: &Vec3| {
-            let offset = *point - camera;
+            let offset = *point - position;
             Vec3::new(offset.dot(x), offset.dot(y), offset.dot(ahead))
         };
         let seen: Vec<Vec3> = sample.iter().map(seen).collect();
-        let depths = coordinates.into_iter().nth(depth)?;
-        let has_camera = CameraAxes::of_points(&seen).is_some();
-        let is_found = has_camera && 2 * N_AVERAGED < depths.len();
-        is_found.then_some(Self { axis: axes[depth], depths })
+        let ahead = CameraAxes::of_points(&seen)?.ahead().z * ahead;
+        let depths = distinct(sample.iter().map(|point| (*point - position).dot(ahead)));
+        let has_steps = 2 * N_AVERAGED < depths.len();
+        has_steps.then_some(Self { position, ahead, image_axes: [x, y], depths })
     }
 
-    /// Returns the distance between the depths around a position.
-    pub fn at(&self, position: Vec3) -> f32 {
-        let above = self.depths.partition_point(|depth| *depth < position.dot(self.axis));
+    /// Returns where a point is in the image, as the tangents of its angles from the view along both axes, and its disparity, the
+    /// reciprocal of its depth. Points beside the camera or behind it have a disparity of at most 0.
+    pub fn project(&self, point: Vec3) -> Vec3 {
+        let offset = point - self.position;
+        let disparity = offset.dot(self.ahead).recip();
+        let [x, y] = self.image_axes.map(|axis| offset.dot(axis) * disparity);
+        Vec3::new(x, y, disparity)
+    }
+
+    /// Returns the difference of the disparities around one.
+    pub fn disparity_step(&self, disparity: f32) -> f32 {
+        self.step(disparity.recip()) * disparity * disparity
+    }
+
+    /// Returns the distance between the depths around one.
+    fn step(&self, depth: f32) -> f32 {
+        let above = self.depths.partition_point(|own| *own < depth);
         let first = above.saturating_sub(N_AVERAGED);
         let last = (above + N_AVERAGED).min(self.depths.len() - 1);
         (self.depths[last] - self.depths[first]) / (last - first) as f32
@@ -103,10 +121,10 @@ mod tests {
 
     #[test]
     fn steps_of_a_disparity_grow_with_the_square_of_the_depth() {
-        let steps = DepthSteps::find(&slanted(Some(300.0))).unwrap();
+        let steps = DepthCamera::find(&slanted(Some(300.0))).unwrap();
         for depth in [1.5, 2.0, 3.0f32] {
             let expected = depth * depth / 300.0;
-            let found = steps.at(Vec3::new(0.3, 0.4, depth));
+            let found = steps.step(depth);
             assert!((found / expected - 1.0).abs() < 0.1, "{found} instead of {expected}");
         }
     }
@@ -116,11 +134,12 @@ mod tests {
         let rotation = DQuat::from_rotation_x(0.7) * DQuat::from_rotation_y(0.3);
         let mut cloud = slanted(Some(300.0));
         cloud.positions.iter_mut().for_each(|point| *point = rotation.as_quat() * *point);
-        assert!(DepthSteps::find(&cloud).is_none());
+        assert!(DepthCamera::find(&cloud).is_none());
         cloud.stations = vec![ScanStation { rotation, ..ScanStation::default() }];
-        let found =
-            DepthSteps::find(&cloud).unwrap().at(rotation.as_quat() * Vec3::new(0.0, 0.0, 2.0));
-        assert!((found / (4.0 / 300.0) - 1.0).abs() < 0.1, "{found}");
+        let camera = DepthCamera::find(&cloud).unwrap();
+        assert!((camera.step(2.0) / (4.0 / 300.0) - 1.0).abs() < 0.1);
+        let seen = camera.project(rotation.as_quat() * Vec3::new(0.6, -0.4, 2.0));
+        assert!(seen.distance(Vec3::new(0.3, -0.2, 0.5)) < 1e-6, "{seen}");
     }
 
     #[test]
@@ -132,20 +151,20 @@ mod tests {
             300.0 / (300.0 / depth(pixel)).round() * Vec3::new(x, y, 1.0)
         };
         let wall = PointCloud::from_positions((0..40_000).map(point).collect());
-        let found = DepthSteps::find(&wall).unwrap().at(Vec3::new(0.0, 0.0, 2.5));
+        let found = DepthCamera::find(&wall).unwrap().step(2.5);
         assert!((found / (2.5 * 2.5 / 300.0) - 1.0).abs() < 0.1, "{found}");
     }
 
     #[test]
     fn other_clouds_have_no_steps() {
         let grid = (0..40_000).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0));
-        assert!(DepthSteps::find(&PointCloud::from_positions(grid.collect())).is_none());
-        assert!(DepthSteps::find(&slanted(None)).is_none());
+        assert!(DepthCamera::find(&PointCloud::from_positions(grid.collect())).is_none());
+        assert!(DepthCamera::find(&slanted(None)).is_none());
         let flight_lines = (0..40_000).map(|i| {
             let across = (i % 200) as f32 - 100.0;
             Vec3::new(across + 1e-3 * (i as f32).sin(), 0.5 * (i / 200) as f32, (i as f32).cos())
         });
-        assert!(DepthSteps::find(&PointCloud::from_positions(flight_lines.collect())).is_none());
-        assert!(DepthSteps::find(&PointCloud::default()).is_none());
+        assert!(DepthCamera::find(&PointCloud::from_positions(flight_lines.collect())).is_none());
+        assert!(DepthCamera::find(&PointCloud::default()).is_none());
     }
 }

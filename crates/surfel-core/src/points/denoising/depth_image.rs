@@ -1,0 +1,455 @@
+//! Depth images: the points of a depth camera, moved along their rays onto the surface that the pixels around describe.
+//!
+//! A depth camera measures disparities, the reciprocals of depths, with an error that hardly depends on the depth. Planes of
+//! space are planes over its image, too. So far walls, whose depths jump by centimetres between pixels, are smoothed as near
+//! ones are.
+//!
+//! Each pixel gets the plane through those around it whose disparities are near that plane (a biweight estimator). Its window
+//! grows as long as one plane explains the pixels in it. Wide windows look at pixels farther apart, each of which stands for
+//! its own smaller window (as in the transform à trous of Holschneider et al. 1989).
+
+use super::depth_camera::DepthCamera;
+use crate::error::Result;
+use crate::math::{DMat3, DVec3, Random, Vec3, median};
+use crate::points::neighbors::KdTree;
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// The pixels around a pixel that take part in its plane. Lengths are in pixels, disparities in units of the image.
+struct Window {
+    radius: isize,
+    /// Distance between the pixels that take part.
+    stride: isize,
+    /// Distance of a disparity from the plane from which it takes no part.
+    max_distance: f32,
+    /// Root mean square distance from which the plane of the smaller window stays.
+    max_error: f32,
+}
+
+const WINDOWS: [Window; 5] = [
+    Window { radius: 2, stride: 1, max_distance: 2.5, max_error: f32::INFINITY },
+    Window { radius: 4, stride: 1, max_distance: 2.0, max_error: 0.7 },
+    Window { radius: 8, stride: 2, max_distance: 1.6, max_error: 0.5 },
+    Window { radius: 16, stride: 4, max_distance: 1.2, max_error: 0.42 },
+    Window { radius: 32, stride: 8, max_distance: 0.9, max_error: 0.32 },
+];
+/// Fraction of [`Window::max_error`] up to which the plane of the smaller window has no weight.
+const FULLY_EXPLAINED: f32 = 0.6;
+/// Number of times that a plane is fitted, each time with weights by the one before.
+const N_FITS: usize = 2;
+/// Minimum fraction of the pixels in a window near its plane, and minimum number of them.
+const MIN_NEAR: f32 = 0.4;
+const MIN_PIXELS: usize = 6;
+/// Maximum distance of a stray disparity from the surface that most pixels around it describe.
+const MAX_STRAY: f32 = 5.0;
+/// Standard deviation of disparities in units of the image. That of rounded disparities is about a third of their step.
+const NOISE_PER_UNIT: f32 = 0.3;
+/// Weight of a change of slopes, as a fraction of that of the disparities: pixels in a line determine no plane.
+const STIFFNESS: f64 = 1e-4;
+/// Number of points that the size of pixels and the noise are measured at.
+const N_SAMPLES: usize = 8192;
+/// Maximum number of pixels for each point, and further ones: scattered points form no image.
+const MAX_PIXELS_PER_POINT: usize = 16;
+/// Ratio of the standard deviation of a normal distribution to the median distance from its mean.
+const DEVIATION_PER_MEDIAN: f32 = 1.4826;
+
+/// The disparities of a depth camera.
+struct DepthImage {
+    width: usize,
+    height: usize,
+    /// Tangents of the angles to the pixel of least coordinates, and from one pixel to the next.
+    first: [f32; 2],
+    pixel_size: f32,
+    /// Unit of the disparities: about the step between them, or three times their noise.
+    unit: f32,
+    /// Row by row; none where nothing was measured.
+    samples: Vec<Option<Sample>>,
+}
+
+/// A measured disparity, and where in the image it was measured, in pixels.
+#[derive(Clone, Copy)]
+struct Sample {
+    x: f32,
+    y: f32,
+    disparity: f32,
+}
+
+/// The surface at a pixel.
+#[derive(Clone, Copy, Default)]
+struct Plane {
+    disparity: f32,
+    /// Change of the disparity from pixel to pixel along both axes.
+    slope: [f32; 2],
+    /// True if the plane was fitted to a window.
+    is_known: bool,
+}
+
+/// Moves the points of a depth camera onto their surface. Returns the noise, the standard deviation of their depths in
+/// spacings of the pixels at that depth, or none if the points form no image.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn smooth_depths(
+    positions: &mut [Vec3],
+    camera: &DepthCamera,
+    progress: &dyn Progress,
+) -> Result<Option<f32>> {
+    let projected: Vec<Vec3> = positions.par_iter().map(|point| camera.project(*point)).collect();
+    let Some(image) = DepthImage::new(&projected, camera, progress)? else { return Ok(None) };
+    let planes = image.planes(progress)?;
+    let move_point = |(position, projected): (&mut Vec3, &Vec3)| {
+        let disparity = image.smoothed(&planes, *projected)?;
+        *position = camera.position + (*position - camera.position) * (projected.z / disparity);
+        Some((1.0 - projected.z / disparity).abs() / image.pixel_size)
+    };
+    let moves: Vec<f32> = positions.par_iter_mut().zip(&projected).filter_map(move_point).collect();
+    Ok(median(moves).map(|distance| DEVIATION_PER_MEDIAN * distance))
+}
+
+impl DepthImage {
+    /// Makes an image of points by their tangents and disparities. Of several in a pixel the first one counts.
+    fn new(
+        projected: &[Vec3],
+        camera: &DepthCamera,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>> {
+        let seen: Vec<Vec3> = projected.iter().copied().filter(|point| 0.0 < point.z).collect();
+        let Some(pixel_size) = pixel_size(&seen, progress)? else { return Ok(None) };
+        let (low, high) =
+            seen.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(*p), high.max(*p))
+            });
+        let [width, height] =
+            [high.x - low.x, high.y - low.y].map(|extent| (extent / pixel_size) as usize + 2);
+        if MAX_PIXELS_PER_POINT * seen.len() < width.saturating_mul(height) {
+            return Ok(None);
+        }
+        let mut image = Self {
+            width,
+            height,
+            first: [low.x, low.y],
+            pixel_size,
+            unit: 1.0,
+            samples: vec![None; width * height],
+        };
+        for point in &seen {
+            let sample = image.sample(*point);
+            let slot = image.pixel(&sample);
+            image.samples[slot].get_or_insert(sample);
+        }
+        let steps = image.some_samples().map(|sample| camera.disparity_step(sample.disparity));
+        let step = median(steps).unwrap_or_default();
+        image.unit = step.max(image.noise() / NOISE_PER_UNIT);
+        image.samples.iter_mut().flatten().for_each(|sample| sample.disparity /= image.unit);
+        Ok(Some(image))
+    }
+
+    fn sample(&self, projected: Vec3) -> Sample {
+        let [x, y] = [projected.x - self.first[0], projected.y - self.first[1]]
+            .map(|at| at / self.pixel_size);
+        Sample { x, y, disparity: projected.z / self.unit }
+    }
+
+    /// Returns the index of the pixel of a sample.
+    fn pixel(&self, sample: &Sample) -> usize {
+        sample.y.round() as usize * self.width + sample.x.round() as usize
+    }
+
+    /// Returns some of the samples.
+    fn some_samples(&self) -> impl Iterator<Item = &Sample> {
+        self.samples.iter().step_by(self.samples.len() / N_SAMPLES + 1).flatten()
+    }
+
+    /// Returns the standard deviation of the disparities of pixels from the lines through those beside them.
+    fn noise(&self) -> f32 {
+        let bends = self.samples.windows(3).filter_map(|three| {
+            let [before, own, after] = [three[0]?, three[1]?, three[2]?];
+            Some((before.disparity - 2.0 * own.disparity + after.disparity).abs())
+        });
+        // A second difference has 1 + 4 + 1 times the variance.
+        DEVIATION_PER_MEDIAN / 6f32.sqrt() * median(bends).unwrap_or_default()
+    }
+
+    /// Returns the disparity of the surface at a point, or none where it is not known or that of another surface.
+    fn smoothed(&self, planes: &[Plane], projected: Vec3) -> Option<f32> {
+        if projected.z <= 0.0 {
+            return None;
+        }
+        let point = self.sample(projected);
+        let pixel = self.pixel(&point);
+        let (sample, plane) = (self.samples[pixel]?, planes[pixel]);
+        let disparity = plane.at(point.x - sample.x, point.y - sample.y);
+        let is_known =
+            plane.is_known && 0.0 < disparity && (disparity - point.disparity).abs() <= MAX_STRAY;
+        is_known.then_some(disparity * self.unit)
+    }
+
+    /// Returns the surface at each pixel.
+    fn planes(&self, progress: &dyn Progress) -> Result<Vec<Plane>> {
+        let across = |sample: &Option<Sample>| {
+            let disparity = sample.map_or(0.0, |sample| sample.disparity);
+            Plane { disparity, ..Plane::default() }
+        };
+        let mut planes: Vec<Plane> = self.samples.iter().map(across).collect();
+        progress.begin("depth image", (WINDOWS.len() * self.height) as u64);
+        for window in &WINDOWS {
+            let widened = |pixel: usize| self.widened(window, &planes, pixel);
+            let row = |y: usize| {
+                progress.check()?;
+                progress.advance(1);
+                Ok((y * self.width..(y + 1) * self.width).map(widened).collect())
+            };
+            let rows: Vec<Vec<Plane>> =
+                (0..self.height).into_par_iter().map(row).collect::<Result<_>>()?;
+            planes = rows.into_iter().flatten().collect();
+        }
+        Ok(planes)
+    }
+
+    /// Returns the plane of a pixel after it was fitted to a window, as far as it explains the pixels there.
+    fn widened(&self, window: &Window, planes: &[Plane], pixel: usize) -> Plane {
+        let own = planes[pixel];
+        let Some(center) = self.samples[pixel] else { return own };
+        let pixels = self.window(window, planes, pixel, &center);
+        let mut fit = Fit::new(&pixels, window, own);
+        if !own.is_known && !fit.is_supported(pixels.len()) {
+            // A stray disparity starts from that of most others.
+            let disparities = pixels.iter().map(|sample| sample.disparity);
+            let disparity = median(disparities).unwrap_or(own.disparity);
+            fit = Fit::new(&pixels, window, Plane { disparity, ..own });
+            if MAX_STRAY < (fit.plane.disparity - own.disparity).abs() {
+                return own;
+            }
+        }
+        let weight = match window.max_error {
+            f32::INFINITY => 1.0,
+            limit => (1.0 - fit.error / limit) / (1.0 - FULLY_EXPLAINED),
+        };
+        if !fit.is_supported(pixels.len()) || weight <= 0.0 {
+            return own;
+        }
+        let weight = weight.min(1.0);
+        let mix = |a: f32, b: f32| a + weight * (b - a);
+        let [x, y] = [0, 1].map(|axis| mix(own.slope[axis], fit.plane.slope[axis]));
+        let disparity = mix(own.disparity, fit.plane.disparity);
+        Plane { disparity, slope: [x, y], is_known: true }
+    }
+
+    /// Returns the surface at the pixels in a window around a pixel, relative to its sample.
+    fn window(
+        &self,
+        window: &Window,
+        planes: &[Plane],
+        pixel: usize,
+        center: &Sample,
+    ) -> Vec<Sample> {
+        let [row, column] = [pixel / self.width, pixel % self.width].map(|at| at as isize);
+        let inside = |center: isize, size: usize| {
+            let steps = -window.radius / window.stride..=window.radius / window.stride;
+            let at = steps.map(move |i| (center + i * window.stride) as usize);
+            at.filter(move |at| *at < size)
+        };
+        let mut found = Vec::with_capacity(96);
+        for y in inside(row, self.height) {
+            for x in inside(column, self.width) {
+                let other = y * self.width + x;
+                if let Some(sample) = self.samples[other] {
+                    found.push(Sample {
+                        x: sample.x - center.x,
+                        y: sample.y - center.y,
+                        disparity: planes[other].disparity,
+                    });
+                }
+            }
+        }
+        found
+    }
+}
+
+impl Plane {
+    /// Returns the disparity at an offset from the pixel.
+    fn at(&self, x: f32, y: f32) -> f32 {
+        self.disparity + self.slope[0] * x + self.slope[1] * y
+    }
+}
+
+/// A plane fitted to the pixels of a window.
+struct Fit {
+    plane: Plane,
+    /// Number of pixels near the plane.
+    n_near: usize,
+    /// Root mean square distance of these.
+    error: f32,
+}
+
+impl Fit {
+    fn new(pixels: &[Sample], window: &Window, start: Plane) -> Self {
+        let mut fit = Self { plane: start, n_near: 0, error: 0.0 };
+        for _ in 0..N_FITS {
+            fit.refine(pixels, window);
+        }
+        fit
+    }
+
+    /// Fits the plane to the pixels that are near it.
+    fn refine(&mut self, pixels: &[Sample], window: &Window) {
+        let per_reach = 1.0 / ((window.radius + window.stride) as f32).powi(2);
+        let per_distance = 1.0 / (window.max_distance * window.max_distance);
+        let [mut w, mut wx, mut wy, mut wxx, mut wxy, mut wyy] = [0.0f32; 6];
+        let [mut wd, mut wxd, mut wyd, mut wdd] = [0.0f32; 4];
+        let mut n_near = 0;
+        for &Sample { x, y, disparity } in pixels {
+            let distance = disparity - self.plane.at(x, y);
+            let nearness = 1.0 - distance * distance * per_distance;
+            let closeness = (1.0 - (x * x + y * y) * per_reach).max(0.0);
+            if nearness <= 0.0 || closeness == 0.0 {
+                continue;
+            }
+            n_near += 1;
+            let weight = nearness * nearness * closeness * closeness;
+            w += weight;
+            wx += weight * x;
+            wy += weight * y;
+            wxx += weight * x * x;
+            wxy += weight * x * y;
+            wyy += weight * y * y;
+            wd += weight * distance;
+            wxd += weight * x * distance;
+            wyd += weight * y * distance;
+            wdd += weight * distance * distance;
+        }
+        self.n_near = n_near;
+        if w <= 0.0 {
+            return;
+        }
+        let stiff = STIFFNESS * f64::from(w);
+        let [w, wx, wy, wxx, wxy, wyy, wd, wxd, wyd] =
+            [w, wx, wy, wxx, wxy, wyy, wd, wxd, wyd].map(f64::from);
+        let matrix = DMat3::from_cols(
+            DVec3::new(w, wx, wy),
+            DVec3::new(wx, wxx + stiff, wxy),
+            DVec3::new(wy, wxy, wyy + stiff),
+        );
+        let change = (matrix.inverse() * DVec3::new(wd, wxd, wyd)).as_vec3();
+        if change.is_finite() {
+            self.plane.disparity += change.x;
+            self.plane.slope[0] += change.y;
+            self.plane.slope[1] += change.z;
+        }
+        self.error = (wdd / w as f32).sqrt();
+    }
+
+    /// True if enough of the pixels are near the plane.
+    fn is_supported(&self, n_pixels: usize) -> bool {
+        MIN_PIXELS <= self.n_near && MIN_NEAR * n_pixels as f32 <= self.n_near as f32
+    }
+}
+
+/// Returns the median tangent of the angle between a point and the nearest other one.
+fn pixel_size(projected: &[Vec3], progress: &dyn Progress) -> Result<Option<f32>> {
+    let flat: Vec<Vec3> = projected.iter().map(|point| point.truncate().extend(0.0)).collect();
+    let tree = KdTree::new(&flat, progress)?;
+    let mut random = Random::new(0, 0);
+    let mut sample = || random.below(flat.len().max(1) as u64) as u32;
+    let points: Vec<u32> = (0..flat.len().min(N_SAMPLES)).map(|_| sample()).collect();
+    let nearest = |point: &u32| {
+        let nearest = tree.nearest(flat[*point as usize], 1, Some(*point));
+        nearest.first().map(|nearest| nearest.distance_squared.sqrt())
+    };
+    let distances: Vec<f32> = points.par_iter().filter_map(nearest).collect();
+    Ok(median(distances).filter(|distance| 0.0 < *distance))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Images of known walls, with rounded disparities.
+
+    use super::*;
+    use crate::points::PointCloud;
+    use crate::progress::NoProgress;
+
+    const N_SIDE: usize = 200;
+    /// Number of steps of the disparity of a depth of 1.
+    const N_STEPS: f32 = 300.0;
+
+    /// Returns the points that a camera at zero sees along Z. `inverse_depth` is that of the scene by the tangents of a pixel;
+    /// `error` adds to its disparity, in steps.
+    fn seen(inverse_depth: impl Fn(f32, f32) -> f32, error: impl Fn(usize) -> f32) -> Vec<Vec3> {
+        let point = |pixel: usize| {
+            let [x, y] = [pixel % N_SIDE, pixel / N_SIDE].map(|at| at as f32 / N_SIDE as f32 - 0.5);
+            let disparity = (N_STEPS * inverse_depth(x, y) + error(pixel)).round();
+            N_STEPS / disparity * Vec3::new(x, y, 1.0)
+        };
+        (0..N_SIDE * N_SIDE).map(point).collect()
+    }
+
+    /// Returns the points after they were smoothed, and the noise.
+    fn smoothed(points: &[Vec3]) -> (Vec<Vec3>, f32) {
+        let cloud = PointCloud::from_positions(points.to_vec());
+        let camera = DepthCamera::find(&cloud).unwrap();
+        let mut moved = cloud.positions;
+        let noise = smooth_depths(&mut moved, &camera, &NoProgress).unwrap().unwrap();
+        (moved, noise)
+    }
+
+    /// Returns the distances of the disparities from those of the scene, in steps, in ascending order.
+    fn errors(points: &[Vec3], inverse_depth: impl Fn(f32, f32) -> f32) -> Vec<f32> {
+        let error = |p: &Vec3| N_STEPS * (1.0 / p.z - inverse_depth(p.x / p.z, p.y / p.z)).abs();
+        let mut errors: Vec<f32> = points.iter().map(error).collect();
+        errors.sort_unstable_by(f32::total_cmp);
+        errors
+    }
+
+    fn slanted_wall(x: f32, y: f32) -> f32 {
+        0.3 + 0.1 * x - 0.13 * y
+    }
+
+    #[test]
+    fn terraces_of_a_slanted_wall_become_even() {
+        let terraces = seen(slanted_wall, |_| 0.0);
+        let (moved, noise) = smoothed(&terraces);
+        let rounding = errors(&terraces, slanted_wall);
+        assert!(0.45 < rounding[rounding.len() * 95 / 100]);
+        let left = errors(&moved, slanted_wall);
+        assert!(left[left.len() * 95 / 100] < 0.08, "{}", left[left.len() * 95 / 100]);
+        // A step is 3.3 * 3.3 / 300 wide at the mean depth of 3.3, and a pixel 3.3 / 200.
+        assert!((0.3..1.2).contains(&noise), "{noise}");
+        for (before, after) in terraces.iter().zip(&moved) {
+            assert!(before.normalize().dot(after.normalize()) > 0.999_999, "its ray is left");
+        }
+    }
+
+    #[test]
+    fn walls_in_front_of_each_other_stay_apart() {
+        let walls = |x: f32, y: f32| if x < 0.021 { 0.45 } else { slanted_wall(x, y) };
+        let (moved, _) = smoothed(&seen(walls, |_| 0.0));
+        let left = errors(&moved, walls);
+        assert!(left[left.len() - 1] < 1.0, "{}", left[left.len() - 1]);
+        assert!(left[left.len() * 95 / 100] < 0.08, "{}", left[left.len() * 95 / 100]);
+    }
+
+    #[test]
+    fn stray_points_move_onto_their_wall_and_parts_of_another_surface_stay() {
+        let error = |pixel: usize| match (pixel % 997, pixel % 613) {
+            (0, _) => 4.0,
+            (_, 0) => 30.0,
+            _ => 0.0,
+        };
+        let points = seen(slanted_wall, error);
+        let left = errors(&smoothed(&points).0, slanted_wall);
+        let n_far = points.iter().enumerate().filter(|(pixel, _)| error(*pixel) == 30.0).count();
+        assert!(left[left.len() - n_far - 1] < 1.0, "{}", left[left.len() - n_far - 1]);
+        assert!(25.0 < left[left.len() - n_far]);
+    }
+
+    #[test]
+    fn points_that_fill_no_image_stay() {
+        let mut points = seen(slanted_wall, |_| 0.0);
+        let camera = DepthCamera::find(&PointCloud::from_positions(points.clone())).unwrap();
+        points.retain(|point| (point.x / point.z - point.y / point.z).abs() < 1e-3);
+        let mut moved = points.clone();
+        assert_eq!(smooth_depths(&mut moved, &camera, &NoProgress).unwrap(), None);
+        assert_eq!(moved, points);
+    }
+}
