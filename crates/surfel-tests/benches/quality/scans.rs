@@ -193,7 +193,10 @@ fn print_tables(title: &str, n_points: usize, compared: &[Compared]) {
     let n_kinds = compared.first().map_or(0, |compared| compared.quality.kinds.len());
     for kind_idx in 0..n_kinds {
         for Compared { surface, quality, .. } in compared {
-            print_row(surface, &quality.kinds[kind_idx]);
+            let kind = &quality.kinds[kind_idx];
+            if 0 < kind.n_pixels {
+                print_row(surface, kind);
+            }
         }
     }
 }
