@@ -10,6 +10,8 @@ use crate::math::{DQuat, DVec3, Vec3};
 
 /// Azimuth of the viewpoint if no other is clearly better: south, a little to the east.
 const FRONT_AZIMUTH_DEG: f64 = 155.0;
+/// Another azimuth must show this fraction of the points more than the front: closed objects look alike from all sides.
+const MIN_GAIN: f64 = 0.1;
 /// Viewpoint above an object that was scanned from there: north is up in the picture.
 const ABOVE_AZIMUTH_DEG: f64 = 180.0;
 const ABOVE_ELEVATION_DEG: f64 = 80.0;
@@ -43,8 +45,10 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     } else {
         let azimuth_deg = most_visible_azimuth_deg(points, elevation_deg, fit);
         let is_front = azimuth_deg == FRONT_AZIMUTH_DEG && MIN_UPRIGHT_FLATNESS <= flatness;
-        let from_side =
-            (if is_front { front_azimuth_deg(points, fit) } else { azimuth_deg }, elevation_deg);
+        let from_side = (
+            if is_front { front_azimuth_deg(points, elevation_deg, fit) } else { azimuth_deg },
+            elevation_deg,
+        );
         let from_above = (ABOVE_AZIMUTH_DEG, ABOVE_ELEVATION_DEG);
         let is_open = fit.elevation_deg.is_none() && !fit.is_turntable;
         if is_open && is_scan_from(from_above, from_side, points, fit) {
@@ -91,8 +95,6 @@ fn best_fit_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) ->
 ///
 /// A scan from one side shows all points from where the scanner stood, and hollow backs from behind.
 fn most_visible_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) -> f64 {
-    /// Another azimuth must show this much more than the front: closed objects look alike from all sides.
-    const MIN_GAIN: f64 = 0.1;
     let visible = |azimuth_deg: f64| visible_from((azimuth_deg, elevation_deg), points, fit);
     let azimuths = (1..12).map(|step| FRONT_AZIMUTH_DEG + 30.0 * f64::from(step));
     let fractions = azimuths.map(|azimuth_deg| (visible(azimuth_deg), azimuth_deg));
@@ -105,23 +107,23 @@ fn most_visible_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit
     }
 }
 
-/// Returns the azimuth of an upright object's front: the usual one, or the opposite if that has more relief.
+/// Returns the azimuth of an upright object's front: the usual one, or the opposite if that has more relief and shows as much.
 ///
 /// Models face +Z if up is +Y and -Y if up is +Z, which is south in both cases. Faces, hands and feet give the front of
 /// a figure more relief than its back: the back of the Stanford armadillo, which faces north, has 0.77 times as much;
-/// the two sides of the bunny, which faces west, differ by 4 %.
-fn front_azimuth_deg(points: &[Vec3], fit: &CameraFit) -> f64 {
+/// the two sides of the bunny, which faces west, differ by 4 %. The hollow back of a statue behind shrubs has the most relief.
+fn front_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) -> f64 {
     /// Relief of the opposite side over that of the usual front from which the opposite side is shown.
     const MIN_RELIEF_RATIO: f64 = 1.15;
     let around = |middle_deg: f64| {
         let sides = [-30.0, 0.0, 30.0].map(|turn_deg| middle_deg + turn_deg);
         sides.map(|azimuth_deg| relief(points, azimuth_deg, fit.up)).iter().sum::<f64>()
     };
-    if MIN_RELIEF_RATIO * around(180.0) < around(0.0) {
-        FRONT_AZIMUTH_DEG + 180.0
-    } else {
-        FRONT_AZIMUTH_DEG
-    }
+    let opposite = FRONT_AZIMUTH_DEG + 180.0;
+    let visible = |azimuth_deg: f64| visible_from((azimuth_deg, elevation_deg), points, fit);
+    let is_opposite = MIN_RELIEF_RATIO * around(180.0) < around(0.0)
+        && visible(FRONT_AZIMUTH_DEG) <= visible(opposite) + MIN_GAIN;
+    if is_opposite { opposite } else { FRONT_AZIMUTH_DEG }
 }
 
 /// Returns the mean unevenness of the surface that is visible horizontally from an azimuth: the absolute Laplacian of
@@ -188,6 +190,7 @@ mod tests {
     //! Scans are viewed from the scanner's side, closed objects from the front.
 
     use super::*;
+    use crate::math::Random;
 
     /// Two vertical sheets, one behind the other seen from `front`; the nearer one is half as wide.
     fn sheets(front: Vec3) -> Vec<Vec3> {
@@ -227,6 +230,25 @@ mod tests {
             let forward = automatic_direction(&column.collect::<Vec<Vec3>>(), &fit);
             assert!(forward.dot(toward.as_dvec3()) < -0.5, "{toward}: {forward}");
         }
+    }
+
+    #[test]
+    fn a_hollow_back_behind_shrubs_is_no_front() {
+        // Half a column, whose closed side faces the usual viewpoint, and leaves on its open side.
+        let toward = -direction_from(FRONT_AZIMUTH_DEG, 0.0, Vec3::Z).as_vec3();
+        let point = |across: f32, ahead: f32, height: f32| {
+            across * toward.cross(Vec3::Z) + ahead * toward + height * Vec3::Z
+        };
+        let column = (0..40_000).map(|i| {
+            let (height, angle) = (i as f32 / 20_000.0, 2.399_963 * i as f32);
+            point(0.5 * angle.sin(), 0.5 * angle.cos().abs(), height)
+        });
+        let mut random = Random::new(8, 0);
+        let mut next = || random.next_f32() - 0.5;
+        let leaves = (0..4000).map(|_| point(1.6 * next(), next() - 1.0, 1.6 * next() + 1.0));
+        let points: Vec<Vec3> = column.chain(leaves).collect();
+        let forward = automatic_direction(&points, &CameraFit::default());
+        assert!(forward.dot(toward.as_dvec3()) < -0.9, "{forward}");
     }
 
     #[test]
