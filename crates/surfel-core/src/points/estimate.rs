@@ -14,10 +14,11 @@ use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
 use super::structure::find_structures::{Evidence, all_scattered, find_structures};
 use super::structure::neighborhood_stats::Typical;
-use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
+use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
-use super::structure::vegetation::{count_rough, is_vegetated, land_normal};
+use super::structure::thin_parts::join_thin_parts;
+use super::structure::vegetation::{count_rough, has_leaves, is_vegetated, land_normal};
 use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
@@ -172,7 +173,15 @@ pub fn find_shapes<'a>(
             });
             let stated_normals = cloud.normals.as_deref();
             let evidence = Evidence { rings, is_elevation_grid, stated_normals };
-            find_structures(&tree, fits, radii, voters, &evidence, progress)?
+            let (mut shapes, mut found) =
+                find_structures(&tree, fits, radii, voters, &evidence, progress)?;
+            let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
+            let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
+            if !has_leaves(cloud, &structures, &shown, || rings.is_some()) {
+                join_thin_parts(&tree, radii, &mut shapes, progress)?;
+                found = StructureReport::of(&shapes);
+            }
+            (shapes, found)
         }
         _ => all_scattered(&tree, radii, progress)?,
     };

@@ -55,7 +55,9 @@ impl PreparedCloud {
             None => {
                 let structures = cloud.structures();
                 let has_leaves =
-                    structures.is_some_and(|all| has_leaves(&cloud, &all, || has_rings(&cloud)));
+                    structures.zip(cloud.radii.as_ref()).is_some_and(|(all, radii)| {
+                        has_leaves(&cloud, &all, radii, || has_rings(&cloud))
+                    });
                 Ok(Self { cloud, has_leaves })
             }
         }

@@ -120,18 +120,21 @@ fn without_stray_groups(points: Vec<Vec3>) -> Vec<Vec3> {
 
 /// Returns, for each point, the number of points in its group. Points in cells that touch each other are one group.
 fn group_sizes(points: &[Vec3]) -> Vec<u32> {
-    /// Number of cells along the longest side of the cloud.
-    const N_CELLS: usize = 48;
-    /// Number of cells along each axis of the grid, which has a border.
-    const STRIDE: usize = N_CELLS + 2;
+    /// Maximum number of cells along the longest side of the cloud.
+    const MAX_CELLS: usize = 48;
+    /// Minimum number of points for each square of this number of cells: on a surface sparse points touch each other, too.
+    const POINTS_PER_CELL: usize = 12;
+    let n_cells = (points.len() / POINTS_PER_CELL).isqrt().clamp(1, MAX_CELLS);
+    // Number of cells along each axis of the grid, which has a border.
+    let stride = n_cells + 2;
     let bounds = Aabb::of_points(points.iter().copied());
-    let per_cell = N_CELLS as f32 / bounds.size().max_element().max(f32::MIN_POSITIVE);
+    let per_cell = n_cells as f32 / bounds.size().max_element().max(f32::MIN_POSITIVE);
     let cell = |point: &Vec3| {
         let at = ((*point - bounds.min) * per_cell).to_array();
-        let [x, y, z] = at.map(|along| (along as usize).min(N_CELLS - 1) + 1);
-        x + STRIDE * (y + STRIDE * z)
+        let [x, y, z] = at.map(|along| (along as usize).min(n_cells - 1) + 1);
+        x + stride * (y + stride * z)
     };
-    let mut counts = vec![0u32; STRIDE.pow(3)];
+    let mut counts = vec![0u32; stride.pow(3)];
     points.iter().for_each(|point| counts[cell(point)] += 1);
     let mut size_of_cell = vec![0; counts.len()];
     for first in 0..counts.len() {
@@ -145,7 +148,7 @@ fn group_sizes(points: &[Vec3]) -> Vec<u32> {
             n_looked_at += 1;
             for step in 0..27 {
                 let [x, y, z] = [step % 3, step / 3 % 3, step / 9];
-                let other = cell + x + STRIDE * (y + STRIDE * z) - (1 + STRIDE * (1 + STRIDE));
+                let other = cell + x + stride * (y + stride * z) - (1 + stride * (1 + stride));
                 if counts[other] != 0 && size_of_cell[other] == 0 {
                     size_of_cell[other] = u32::MAX;
                     group.push(other);
@@ -216,6 +219,22 @@ mod tests {
         for few in [vec![], vec![Vec3::ONE], vec![Vec3::ONE; 3]] {
             assert_eq!(without_stray_groups(few.clone()), few);
         }
+    }
+
+    #[test]
+    fn sparse_parts_of_a_small_cloud_are_no_strays() {
+        // A dense head on a sparse neck, whose points are farther apart than 1 / 48 of the length.
+        let mut random = Random::new(9, 0);
+        let mut next = || random.next_f32();
+        let mut tube = |n: usize, low: f32, high: f32| -> Vec<Vec3> {
+            let point = |_| {
+                let (sin, cos) = (std::f32::consts::TAU * next()).sin_cos();
+                Vec3::new(0.2 * cos, 0.2 * sin, low + (high - low) * next())
+            };
+            (0..n).map(point).collect()
+        };
+        let points = [tube(1400, 0.0, 0.3), tube(100, -0.4, 0.0)].concat();
+        assert_eq!(without_stray_groups(points.clone()), points);
     }
 
     #[test]

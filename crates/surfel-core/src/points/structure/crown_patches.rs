@@ -1,18 +1,14 @@
 //! Patches of surface in crowns: by chance some leaves lie in a plane.
 
+use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::points::neighbors::{KdTree, Neighbor, SignedUnionFind};
+use crate::points::neighbors::{KdTree, Neighbor};
 use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
-/// Number of neighbours with which a point of a surface may be connected.
-const N_LINKS: usize = 8;
-/// Number of points whose links are kept at a time.
-const CHUNK: usize = 1 << 16;
 /// Minimum cosine between the normals of connected points.
 const MIN_LINK_COSINE: f32 = 0.7;
 /// Maximum number of points of a patch that is less than one neighbourhood.
@@ -67,40 +63,12 @@ fn small_patches(
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<u32>>> {
     let is_surface = |point: usize| structures[point] == Structure::Surface;
-    let links = |point: usize| -> Result<Vec<u32>> {
-        progress.check()?;
-        if !is_surface(point) {
-            return Ok(Vec::new());
-        }
-        let nearest = tree.nearest(tree.positions()[point], N_LINKS, Some(point as u32));
-        let normal = shapes[point].normal;
-        let is_linked = |other: &u32| {
-            let other = *other as usize;
-            is_surface(other) && MIN_LINK_COSINE < normal.dot(shapes[other].normal).abs()
-        };
-        Ok(nearest.iter().map(|neighbor| neighbor.index).filter(is_linked).collect())
+    let is_linked = |point: usize, other: usize| {
+        MIN_LINK_COSINE < shapes[point].normal.dot(shapes[other].normal).abs()
     };
-    let n_points = structures.len();
-    let mut components = SignedUnionFind::new(n_points);
-    for start in (0..n_points).step_by(CHUNK) {
-        let chunk = start..n_points.min(start + CHUNK);
-        let links = chunk.clone().into_par_iter().map(links);
-        let links: Vec<Vec<u32>> = links.collect::<Result<_>>()?;
-        for (point, links) in chunk.zip(links) {
-            for other in links {
-                let (own, other) = (components.find(point as u32), components.find(other));
-                components.join(own, other, false);
-            }
-        }
-    }
-    let mut patches: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for point in (0..n_points).filter(|point| is_surface(*point)) {
-        let root = components.find(point as u32).root;
-        if components.size(root) as usize <= MAX_POINTS {
-            patches.entry(root).or_default().push(point as u32);
-        }
-    }
-    Ok(patches.into_values().collect())
+    let mut patches = connected_parts(tree, is_surface, is_linked, progress)?;
+    patches.retain(|patch| patch.len() <= MAX_POINTS);
+    Ok(patches)
 }
 
 /// Returns true if a small patch lies in a crown.

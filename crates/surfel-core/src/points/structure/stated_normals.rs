@@ -92,7 +92,7 @@ mod tests {
             let normal = cos * out + sin * Vec3::Z;
             (2.0 * out + 0.15 * along * Vec3::Z + 0.3 * normal, normal)
         };
-        let (positions, normals): (Vec<Vec3>, Vec<Vec3>) = (0..700).map(point).unzip();
+        let (positions, normals): (Vec<Vec3>, Vec<Vec3>) = (0..500).map(point).unzip();
         PointCloud { normals: Some(normals), ..PointCloud::from_positions(positions) }
     }
 
@@ -100,8 +100,8 @@ mod tests {
     fn sparse_points_with_normals_of_a_surface_form_one() {
         let tube = sparse_tube();
         let without = PointCloud::from_positions(tube.positions.clone());
-        assert!(200 < n_scattered(without));
-        assert_eq!(n_scattered(tube), 0);
+        assert!(400 < n_scattered(without));
+        assert!(n_scattered(tube) < 5);
     }
 
     #[test]

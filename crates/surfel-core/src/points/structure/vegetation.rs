@@ -32,10 +32,11 @@ const VEGETATION_CLASSES: std::ops::RangeInclusive<u8> = 3..=5;
 /// Returns true if the scattered points of a cloud are leaves rather than parts of sparse or noisy objects: those that the
 /// file calls vegetation, those on land, those in crowns, those of a spinning scanner, and those of clouds with much of
 /// them. Without such classes the points of a cloud that are all scattered stand for themselves.
-/// `has_rings` tells whether the points are on the rings of a spinning scanner.
+/// `radii` are those of the points, and `has_rings` tells whether the points are on the rings of a spinning scanner.
 pub fn has_leaves(
     cloud: &PointCloud,
     structures: &[Structure],
+    radii: &[f32],
     has_rings: impl FnOnce() -> bool,
 ) -> bool {
     let is_scattered = |structure: &Structure| *structure == Structure::Scatter;
@@ -49,7 +50,9 @@ pub fn has_leaves(
     }
     let are_plants = || match is_much(n_scattered, structures.len()) {
         true => MIN_LEAVES <= n_scattered,
-        false => MIN_CROWN as usize <= n_scattered && has_crowns(cloud, structures),
+        false => {
+            MIN_CROWN as usize <= n_scattered && has_crowns(&cloud.positions, structures, radii)
+        }
     };
     // A spinning scanner, as on vehicles, has so few rings in the trees of a street that they make no crowns.
     let is_street_scan = || {
@@ -63,8 +66,7 @@ pub fn has_leaves(
 
 /// Returns true if most of the scattered points, without those that lie alone, are in crowns: at least seven of ten points
 /// around them are scattered.
-fn has_crowns(cloud: &PointCloud, structures: &[Structure]) -> bool {
-    let Some(radii) = &cloud.radii else { return false };
+fn has_crowns(positions: &[Vec3], structures: &[Structure], radii: &[f32]) -> bool {
     let is_scattered = |point: &usize| structures[*point] == Structure::Scatter;
     let Some(radius) = median((0..radii.len()).filter(is_scattered).map(|point| radii[point]))
     else {
@@ -72,7 +74,7 @@ fn has_crowns(cloud: &PointCloud, structures: &[Structure]) -> bool {
     };
     let cells_per_unit = 1.0 / f64::from(CROWN_CELL * radius);
     let cell = |point: usize| {
-        let cell = cloud.positions[point].as_dvec3() * cells_per_unit;
+        let cell = positions[point].as_dvec3() * cells_per_unit;
         cell.floor().to_array().map(|index| index as i64)
     };
     let mut cells: HashMap<[i64; 3], CrownCell> = HashMap::new();
@@ -175,6 +177,10 @@ mod tests {
         (cloud, structures)
     }
 
+    fn radii(cloud: &PointCloud) -> &[f32] {
+        cloud.radii.as_deref().unwrap_or_default()
+    }
+
     #[test]
     fn scattered_points_of_objects_are_no_leaves() {
         let cube = Vec3::ONE;
@@ -188,7 +194,7 @@ mod tests {
         ] {
             let (cloud, structures) = cloud(n_points, n_scattered, size);
             assert_eq!(
-                has_leaves(&cloud, &structures, || false),
+                has_leaves(&cloud, &structures, radii(&cloud), || false),
                 expected,
                 "{n_scattered} of {n_points}"
             );
@@ -201,7 +207,11 @@ mod tests {
             let (mut cloud, structures) = cloud(100, n_scattered, Vec3::ONE);
             for (class, expected) in [(2, false), (3, true), (5, true), (6, false)] {
                 cloud.classification = Some([vec![class; 20], vec![1; 80]].concat());
-                assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{class}");
+                assert_eq!(
+                    has_leaves(&cloud, &structures, radii(&cloud), || false),
+                    expected,
+                    "{class}"
+                );
             }
         }
     }
@@ -210,7 +220,7 @@ mod tests {
     fn vegetation_elsewhere_makes_no_leaves() {
         let (mut cloud, structures) = cloud(100, 50, Vec3::ONE);
         cloud.classification = Some([vec![6; 49], vec![5; 51]].concat());
-        assert!(!has_leaves(&cloud, &structures, || false));
+        assert!(!has_leaves(&cloud, &structures, radii(&cloud), || false));
     }
 
     #[test]
@@ -228,7 +238,11 @@ mod tests {
             cloud.radii = Some(vec![0.08; cloud.len()]);
             let mut structures = vec![Structure::Surface; cloud.len()];
             structures[wall.len()..].fill(Structure::Scatter);
-            assert_eq!(has_leaves(&cloud, &structures, || false), expected, "{n_scattered}");
+            assert_eq!(
+                has_leaves(&cloud, &structures, radii(&cloud), || false),
+                expected,
+                "{n_scattered}"
+            );
         }
     }
 
@@ -240,7 +254,7 @@ mod tests {
         {
             let mut structures = vec![Structure::Surface; 16_000];
             structures[..n_scattered].fill(Structure::Scatter);
-            let found = has_leaves(&cloud, &structures, || has_rings);
+            let found = has_leaves(&cloud, &structures, radii(&cloud), || has_rings);
             assert_eq!(found, expected, "{has_rings} {n_scattered}");
         }
     }

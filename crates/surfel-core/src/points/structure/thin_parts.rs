@@ -1,0 +1,102 @@
+//! Thin parts of objects, as fingers, horns and the edges of wings: the nearest points of a point there are on all sides of
+//! the part, so that no plane fits them. Fewer of them lie on one side.
+
+use super::connected_parts::connected_parts;
+use super::point_shape::{PointShape, Structure, is_surface};
+use crate::error::Result;
+use crate::points::neighbors::KdTree;
+use crate::points::normals::planes::{PlaneFit, fit_plane};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Number of neighbours on one side of a thin part.
+const N_NEIGHBORS: usize = 8;
+/// Minimum number of points of a part.
+const MIN_POINTS: usize = 16;
+/// Minimum fraction of the points of a part whose neighbours lie in a plane. Noise has 0.1 to 0.4.
+const MIN_EVEN: f32 = 0.5;
+
+/// Makes surfaces of the connected scattered points most of which lie in a plane with few neighbours. `radii` are those of
+/// points of surfaces.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn join_thin_parts(
+    tree: &KdTree,
+    radii: &[f32],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let is_scattered = |point: usize| shapes[point].structure == Structure::Scatter;
+    let parts = connected_parts(tree, is_scattered, |_, _| true, progress)?;
+    let positions = tree.positions();
+    let fit = |point: &u32| {
+        let neighbors = tree.nearest(positions[*point as usize], N_NEIGHBORS, Some(*point));
+        fit_plane(positions, *point as usize, &neighbors)
+    };
+    let even_fits = |part: &Vec<u32>| -> Result<Option<Vec<PlaneFit>>> {
+        progress.check()?;
+        if part.len() < MIN_POINTS {
+            return Ok(None);
+        }
+        let fits: Vec<PlaneFit> = part.par_iter().map(fit).collect();
+        let n_even = fits.iter().filter(|fit| is_surface(fit)).count();
+        Ok((MIN_EVEN * part.len() as f32 <= n_even as f32).then_some(fits))
+    };
+    let fits = parts.par_iter().map(even_fits).collect::<Result<Vec<_>>>()?;
+    for (part, fits) in parts.iter().zip(fits) {
+        for (point, fit) in part.iter().zip(fits.into_iter().flatten()) {
+            let point = *point as usize;
+            shapes[point] = PointShape {
+                structure: Structure::Surface,
+                normal: fit.normal,
+                radius: radii[point],
+            };
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! Fingers and stray points.
+
+    use super::*;
+    use crate::math::{Random, Vec3};
+    use crate::points::test_clouds::prepared;
+    use std::f32::consts::TAU;
+
+    /// Returns a ball of radius 10 with a spacing of about 1, and a finger with eight points around.
+    fn hand(at_finger: impl Fn(&mut Random, Vec3) -> Vec3) -> Vec<Vec3> {
+        let mut random = Random::new(4, 0);
+        let mut points: Vec<Vec3> = (0..1200)
+            .map(|i| {
+                let z = 1.0 - (2.0 * i as f32 + 1.0) / 1200.0;
+                let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+                10.0 * Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+            })
+            .collect();
+        points.extend((0..160).map(|i| {
+            let (sin, cos) = (TAU * (i % 8) as f32 / 8.0 + 0.4 * (i / 8) as f32).sin_cos();
+            let axis = Vec3::new(0.0, 0.0, 12.0 + (i / 8) as f32);
+            at_finger(&mut random, axis + 1.2 * Vec3::new(cos, sin, 0.0))
+        }));
+        points
+    }
+
+    #[test]
+    fn a_finger_is_a_surface_and_points_that_fill_it_are_not() {
+        let n_of_surface = |points: Vec<Vec3>| {
+            let (cloud, structures) = prepared(points);
+            let finger = cloud.positions().iter().zip(&structures).filter(|(p, _)| 11.5 < p.z);
+            finger.filter(|(_, structure)| **structure == Structure::Surface).count()
+        };
+        assert_eq!(n_of_surface(hand(|_, point| point)), 160);
+        let filled = |random: &mut Random, point: Vec3| {
+            let [x, y, z] = std::array::from_fn(|_| 6.0 * (random.next_f32() - 0.5));
+            Vec3::new(x, y, point.z + z)
+        };
+        assert!(n_of_surface(hand(filled)) < 40);
+    }
+}
