@@ -12,9 +12,9 @@ const N_SAMPLES: usize = 65_536;
 const MIN_POINTS: usize = 4096;
 /// Maximum fraction of different coordinates along the axis of depths, minimum fraction along both others, and minimum ratio of
 /// theirs to that of the depths. A wall across the view has few coordinates along these too: one of each pixel at each of a few depths.
-const MAX_DEPTHS: f32 = 0.05;
+const MAX_DEPTHS: f32 = 0.12;
 const MIN_OTHERS: f32 = 0.02;
-const MIN_OTHERS_PER_DEPTH: f32 = 8.0;
+const MIN_OTHERS_PER_DEPTH: f32 = 4.0;
 /// Difference of two equal coordinates by rounding, as a fraction of the largest.
 const ROUNDING: f32 = 1e-6;
 /// Number of depths before and behind one that its step is averaged over.

@@ -15,7 +15,7 @@ use crate::points::neighbors::KdTree;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// The pixels around a pixel that take part in its plane. Lengths are in pixels, disparities in units of the image.
+/// The pixels around a pixel that take part in its plane. Lengths are in pixels, disparities in the unit at the pixel.
 struct Window {
     radius: isize,
     /// Distance between the pixels that take part.
@@ -42,12 +42,17 @@ const MIN_NEAR: f32 = 0.4;
 const MIN_PIXELS: usize = 6;
 /// Maximum distance of a stray disparity from the surface that most pixels around it describe.
 const MAX_STRAY: f32 = 5.0;
-/// Standard deviation of disparities in units of the image. That of rounded disparities is about a third of their step.
+/// Standard deviation of disparities in their unit. That of rounded disparities is about a third of their step.
 const NOISE_PER_UNIT: f32 = 0.3;
 /// Weight of a change of slopes, as a fraction of that of the disparities: pixels in a line determine no plane.
 const STIFFNESS: f64 = 1e-4;
-/// Number of points that the size of pixels and the noise are measured at.
+/// Number of points that the size of pixels is measured at.
 const N_SAMPLES: usize = 8192;
+/// Number of groups of pixels by their disparity whose noise is measured, and least number of pixels of a group.
+const N_GROUPS: usize = 16;
+const MIN_GROUP_SIZE: usize = 256;
+/// Maximum ratio of the unit of a group to the median: rough things fill a group of their own.
+const MAX_UNIT_RATIO: f32 = 8.0;
 /// Maximum number of pixels for each point, and further ones: scattered points form no image.
 const MAX_PIXELS_PER_POINT: usize = 16;
 /// Ratio of the standard deviation of a normal distribution to the median distance from its mean.
@@ -60,10 +65,17 @@ struct DepthImage {
     /// Tangents of the angles to the pixel of least coordinates, and from one pixel to the next.
     first: [f32; 2],
     pixel_size: f32,
-    /// Unit of the disparities: about the step between them, or three times their noise.
-    unit: f32,
+    units: Units,
     /// Row by row; none where nothing was measured.
     samples: Vec<Option<Sample>>,
+}
+
+/// Units of disparities, which grow with the noise: at least the step between disparities, and three times their standard
+/// deviation.
+#[derive(Default)]
+struct Units {
+    /// Disparities in ascending order, each with the unit there.
+    groups: Vec<(f32, f32)>,
 }
 
 /// A measured disparity, and where in the image it was measured, in pixels.
@@ -130,7 +142,7 @@ impl DepthImage {
             height,
             first: [low.x, low.y],
             pixel_size,
-            unit: 1.0,
+            units: Units::default(),
             samples: vec![None; width * height],
         };
         for point in &seen {
@@ -138,37 +150,19 @@ impl DepthImage {
             let slot = image.pixel(&sample);
             image.samples[slot].get_or_insert(sample);
         }
-        let steps = image.some_samples().map(|sample| camera.disparity_step(sample.disparity));
-        let step = median(steps).unwrap_or_default();
-        image.unit = step.max(image.noise() / NOISE_PER_UNIT);
-        image.samples.iter_mut().flatten().for_each(|sample| sample.disparity /= image.unit);
+        image.units = Units::of_image(&image, camera);
         Ok(Some(image))
     }
 
     fn sample(&self, projected: Vec3) -> Sample {
         let [x, y] = [projected.x - self.first[0], projected.y - self.first[1]]
             .map(|at| at / self.pixel_size);
-        Sample { x, y, disparity: projected.z / self.unit }
+        Sample { x, y, disparity: projected.z }
     }
 
     /// Returns the index of the pixel of a sample.
     fn pixel(&self, sample: &Sample) -> usize {
         sample.y.round() as usize * self.width + sample.x.round() as usize
-    }
-
-    /// Returns some of the samples.
-    fn some_samples(&self) -> impl Iterator<Item = &Sample> {
-        self.samples.iter().step_by(self.samples.len() / N_SAMPLES + 1).flatten()
-    }
-
-    /// Returns the standard deviation of the disparities of pixels from the lines through those beside them.
-    fn noise(&self) -> f32 {
-        let bends = self.samples.windows(3).filter_map(|three| {
-            let [before, own, after] = [three[0]?, three[1]?, three[2]?];
-            Some((before.disparity - 2.0 * own.disparity + after.disparity).abs())
-        });
-        // A second difference has 1 + 4 + 1 times the variance.
-        DEVIATION_PER_MEDIAN / 6f32.sqrt() * median(bends).unwrap_or_default()
     }
 
     /// Returns the disparity of the surface at a point, or none where it is not known or that of another surface.
@@ -180,9 +174,10 @@ impl DepthImage {
         let pixel = self.pixel(&point);
         let (sample, plane) = (self.samples[pixel]?, planes[pixel]);
         let disparity = plane.at(point.x - sample.x, point.y - sample.y);
-        let is_known =
-            plane.is_known && 0.0 < disparity && (disparity - point.disparity).abs() <= MAX_STRAY;
-        is_known.then_some(disparity * self.unit)
+        let is_known = plane.is_known
+            && 0.0 < disparity
+            && (disparity - point.disparity).abs() <= MAX_STRAY * self.units.at(disparity);
+        is_known.then_some(disparity)
     }
 
     /// Returns the surface at each pixel.
@@ -212,19 +207,20 @@ impl DepthImage {
         let own = planes[pixel];
         let Some(center) = self.samples[pixel] else { return own };
         let pixels = self.window(window, planes, pixel, &center);
-        let mut fit = Fit::new(&pixels, window, own);
+        let unit = self.units.at(own.disparity);
+        let mut fit = Fit::new(&pixels, window, unit, own);
         if !own.is_known && !fit.is_supported(pixels.len()) {
             // A stray disparity starts from that of most others.
             let disparities = pixels.iter().map(|sample| sample.disparity);
             let disparity = median(disparities).unwrap_or(own.disparity);
-            fit = Fit::new(&pixels, window, Plane { disparity, ..own });
-            if MAX_STRAY < (fit.plane.disparity - own.disparity).abs() {
+            fit = Fit::new(&pixels, window, unit, Plane { disparity, ..own });
+            if MAX_STRAY * unit < (fit.plane.disparity - own.disparity).abs() {
                 return own;
             }
         }
         let weight = match window.max_error {
             f32::INFINITY => 1.0,
-            limit => (1.0 - fit.error / limit) / (1.0 - FULLY_EXPLAINED),
+            limit => (1.0 - fit.error / (limit * unit)) / (1.0 - FULLY_EXPLAINED),
         };
         if !fit.is_supported(pixels.len()) || weight <= 0.0 {
             return own;
@@ -267,6 +263,40 @@ impl DepthImage {
     }
 }
 
+impl Units {
+    /// Measures the units of an image by the distances of pixels from the lines through those beside them.
+    fn of_image(image: &DepthImage, camera: &DepthCamera) -> Self {
+        let bend = |three: &[Option<Sample>]| {
+            let [before, own, after] = [three[0]?, three[1]?, three[2]?].map(|it| it.disparity);
+            Some((own, (before - 2.0 * own + after).abs()))
+        };
+        let mut bends: Vec<(f32, f32)> = image.samples.windows(3).filter_map(bend).collect();
+        bends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let size = bends.len().div_ceil(N_GROUPS).max(MIN_GROUP_SIZE);
+        let unit = |group: &[(f32, f32)]| {
+            let disparity = group[group.len() / 2].0;
+            // A second difference has 1 + 4 + 1 times the variance.
+            let bend = median(group.iter().map(|(_, bend)| *bend)).unwrap_or_default();
+            let noise = DEVIATION_PER_MEDIAN / 6f32.sqrt() * bend;
+            (disparity, camera.disparity_step(disparity).max(noise / NOISE_PER_UNIT))
+        };
+        let mut groups: Vec<(f32, f32)> = bends.chunks(size).map(unit).collect();
+        let typical = median(groups.iter().map(|(_, unit)| *unit)).unwrap_or_default();
+        groups.iter_mut().for_each(|(_, unit)| *unit = unit.min(MAX_UNIT_RATIO * typical));
+        Self { groups }
+    }
+
+    /// Returns the unit at a disparity, between those of the groups around it.
+    fn at(&self, disparity: f32) -> f32 {
+        let above = self.groups.partition_point(|(own, _)| *own < disparity);
+        let last = self.groups.len().saturating_sub(1);
+        let group = |i: usize| self.groups.get(i.min(last)).copied().unwrap_or_default();
+        let ((low, low_unit), (high, high_unit)) = (group(above.saturating_sub(1)), group(above));
+        let fraction = ((disparity - low) / (high - low).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        low_unit + fraction * (high_unit - low_unit)
+    }
+}
+
 impl Plane {
     /// Returns the disparity at an offset from the pixel.
     fn at(&self, x: f32, y: f32) -> f32 {
@@ -284,18 +314,18 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(pixels: &[Sample], window: &Window, start: Plane) -> Self {
+    fn new(pixels: &[Sample], window: &Window, unit: f32, start: Plane) -> Self {
         let mut fit = Self { plane: start, n_near: 0, error: 0.0 };
         for _ in 0..N_FITS {
-            fit.refine(pixels, window);
+            fit.refine(pixels, window, unit);
         }
         fit
     }
 
     /// Fits the plane to the pixels that are near it.
-    fn refine(&mut self, pixels: &[Sample], window: &Window) {
+    fn refine(&mut self, pixels: &[Sample], window: &Window, unit: f32) {
         let per_reach = 1.0 / ((window.radius + window.stride) as f32).powi(2);
-        let per_distance = 1.0 / (window.max_distance * window.max_distance);
+        let per_distance = 1.0 / (window.max_distance * unit).powi(2);
         let [mut w, mut wx, mut wy, mut wxx, mut wxy, mut wyy] = [0.0f32; 6];
         let [mut wd, mut wxd, mut wyd, mut wdd] = [0.0f32; 4];
         let mut n_near = 0;
@@ -417,6 +447,28 @@ mod tests {
         assert!((0.3..1.2).contains(&noise), "{noise}");
         for (before, after) in terraces.iter().zip(&moved) {
             assert!(before.normalize().dot(after.normalize()) > 0.999_999, "its ray is left");
+        }
+    }
+
+    #[test]
+    fn near_and_far_parts_are_smoothed_whatever_their_noise() {
+        // Time of flight: a noise of 3 mm at depths of 1 to 4 m, rounded to millimetres.
+        let slanted = |x: f32, y: f32| 0.6 + 0.5 * x - 0.2 * y;
+        let mut random = Random::new(3, 0);
+        let mut measured = |point: &Vec3| {
+            let depth = 1.0 / slanted(point.x / point.z, point.y / point.z);
+            let depth = depth + 0.003 * random.next_gaussian() as f32;
+            (1000.0 * depth).round() / 1000.0 * (point / point.z)
+        };
+        let points: Vec<Vec3> = seen(slanted_wall, |_| 0.0).iter().map(&mut measured).collect();
+        let (moved, _) = smoothed(&points);
+        for (low, high) in [(1.0, 1.5), (1.5, 2.0), (2.0, 4.0)] {
+            let of_range = points.iter().zip(&moved).filter(|(p, _)| (low..high).contains(&p.z));
+            let error = |p: &Vec3| (p.z - 1.0 / slanted(p.x / p.z, p.y / p.z)).abs();
+            let errors = of_range.map(|(before, after)| (error(before), error(after)));
+            let (before, after) =
+                errors.fold((0.0, 0.0), |(b, a), (before, after)| (b + before, a + after));
+            assert!(after < 0.2 * before, "{low}: {after} of {before}");
         }
     }
 
