@@ -93,8 +93,8 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
     })
 }
 
-/// Returns the view of the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z if -Y is up and
-/// along -Z if +Y is up, or `None` if its points are not those that such a camera measured.
+/// Returns the view from the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z if -Y is up and
+/// along -Z if +Y is up, onto the middle of what it measured, or `None` if no such camera measured the points.
 pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let zero = (-cloud.origin).as_vec3();
     let offsets: Vec<Vec3> = valid_sample(cloud).into_iter().map(|point| point - zero).collect();
@@ -102,17 +102,21 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     if offsets.len() < MIN_POINTS {
         return None;
     }
+    let ahead = axes.ahead();
     let in_view = offsets.iter().filter(|offset| axes.sees(**offset));
-    let slope = in_view.map(|offset| (offset.y / offset.z).abs()).fold(0.0, f32::max);
+    let tangents = in_view.map(|offset| offset.truncate() / offset.dot(ahead));
+    let seen = Aabb::of_points(tangents.map(|tangents| tangents.extend(0.0)));
+    let [low, high] = [seen.min, seen.max].map(|corner| corner.as_dvec3().map(f64::atan));
+    let middle = (0.5 * (low + high)).map(f64::tan);
     let points = polar_points(Vec3::ZERO, &offsets, up);
     let [near, median, far] = distances(&points)?;
     let is_scan =
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
     is_scan.then(|| InsideView {
         position: DVec3::ZERO,
-        direction: axes.ahead().as_dvec3(),
+        direction: (middle + ahead.as_dvec3()).normalize(),
         distance: median.into(),
-        view_angle_deg: 2.0 * f64::from(slope).atan().to_degrees(),
+        view_angle_deg: (high.y - low.y).to_degrees(),
     })
 }
 
@@ -270,6 +274,15 @@ mod tests {
         let mut moved = cloud;
         moved.origin = DVec3::new(0.0, 0.0, -20.0);
         assert_eq!(find_depth_camera(&moved, Vec3::NEG_Y), None);
+    }
+
+    #[test]
+    fn a_depth_image_without_its_left_side_is_seen_in_the_middle() {
+        let mut cloud = depth_image(false);
+        cloud.positions.retain(|point| -0.1 * point.z < point.x);
+        let station = find_depth_camera(&cloud, Vec3::NEG_Y).unwrap();
+        let angle = f64::atan2(station.direction.x, station.direction.z);
+        assert!((angle - 0.5 * (0.5f64.atan() - 0.1f64.atan())).abs() < 5e-3, "{angle}");
     }
 
     #[test]
