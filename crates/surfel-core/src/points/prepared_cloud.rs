@@ -38,7 +38,7 @@ impl PreparedCloud {
     ///
     /// # Errors
     ///
-    /// Those of [`PreparedCloud::new`].
+    /// Returns the errors of [`PreparedCloud::new`].
     pub(super) fn with_rings(
         cloud: PointCloud,
         has_rings: impl FnOnce(&PointCloud) -> bool,

@@ -4,8 +4,8 @@
 //! edges (bilateral filter), and each point moves along its normal onto the weighted mean of its neighbours' planes
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
-use super::depth_camera::DepthCamera;
 use super::depth_image::smooth_depths;
+use super::depth_sensor::DepthSensor;
 use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::Noise;
 use super::noise_at_point::{GROUP_SIZE, LocalFit};
@@ -105,8 +105,8 @@ pub fn denoise(
         return Ok(None);
     }
     let measured = cloud.positions.clone();
-    let depth_noise = match DepthCamera::find(cloud) {
-        Some(camera) => smooth_depths(&mut cloud.positions, &camera, progress)?,
+    let depth_noise = match DepthSensor::find(cloud) {
+        Some(sensor) => smooth_depths(&mut cloud.positions, &sensor, progress)?,
         None => None,
     };
     let found = denoise_surfaces(cloud, is_auto, progress)?;

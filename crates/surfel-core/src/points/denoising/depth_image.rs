@@ -8,7 +8,7 @@
 //! grows as long as one plane explains the pixels in it. Wide windows look at pixels farther apart, each of which stands for
 //! its own smaller window (as in the transform à trous of Holschneider et al. 1989).
 
-use super::depth_camera::DepthCamera;
+use super::depth_sensor::DepthSensor;
 use crate::error::Result;
 use crate::math::{DMat3, DVec3, Random, Vec3, median};
 use crate::points::neighbors::KdTree;
@@ -104,15 +104,15 @@ struct Plane {
 /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
 pub fn smooth_depths(
     positions: &mut [Vec3],
-    camera: &DepthCamera,
+    sensor: &DepthSensor,
     progress: &dyn Progress,
 ) -> Result<Option<f32>> {
-    let projected: Vec<Vec3> = positions.par_iter().map(|point| camera.project(*point)).collect();
-    let Some(image) = DepthImage::new(&projected, camera, progress)? else { return Ok(None) };
+    let projected: Vec<Vec3> = positions.par_iter().map(|point| sensor.project(*point)).collect();
+    let Some(image) = DepthImage::new(&projected, sensor, progress)? else { return Ok(None) };
     let planes = image.planes(progress)?;
     let move_point = |(position, projected): (&mut Vec3, &Vec3)| {
         let disparity = image.smoothed(&planes, *projected)?;
-        *position = camera.position + (*position - camera.position) * (projected.z / disparity);
+        *position = sensor.position + (*position - sensor.position) * (projected.z / disparity);
         Some((1.0 - projected.z / disparity).abs() / image.pixel_size)
     };
     let moves: Vec<f32> = positions.par_iter_mut().zip(&projected).filter_map(move_point).collect();
@@ -123,7 +123,7 @@ impl DepthImage {
     /// Makes an image of points by their tangents and disparities. Of several in a pixel the first one counts.
     fn new(
         projected: &[Vec3],
-        camera: &DepthCamera,
+        sensor: &DepthSensor,
         progress: &dyn Progress,
     ) -> Result<Option<Self>> {
         let seen: Vec<Vec3> = projected.iter().copied().filter(|point| 0.0 < point.z).collect();
@@ -150,7 +150,7 @@ impl DepthImage {
             let slot = image.pixel(&sample);
             image.samples[slot].get_or_insert(sample);
         }
-        image.units = Units::of_image(&image, camera);
+        image.units = Units::of_image(&image, sensor);
         Ok(Some(image))
     }
 
@@ -265,7 +265,7 @@ impl DepthImage {
 
 impl Units {
     /// Measures the units of an image by the distances of pixels from the lines through those beside them.
-    fn of_image(image: &DepthImage, camera: &DepthCamera) -> Self {
+    fn of_image(image: &DepthImage, sensor: &DepthSensor) -> Self {
         let bend = |three: &[Option<Sample>]| {
             let [before, own, after] = [three[0]?, three[1]?, three[2]?].map(|it| it.disparity);
             Some((own, (before - 2.0 * own + after).abs()))
@@ -278,7 +278,7 @@ impl Units {
             // A second difference has 1 + 4 + 1 times the variance.
             let bend = median(group.iter().map(|(_, bend)| *bend)).unwrap_or_default();
             let noise = DEVIATION_PER_MEDIAN / 6f32.sqrt() * bend;
-            (disparity, camera.disparity_step(disparity).max(noise / NOISE_PER_UNIT))
+            (disparity, sensor.disparity_step(disparity).max(noise / NOISE_PER_UNIT))
         };
         let mut groups: Vec<(f32, f32)> = bends.chunks(size).map(unit).collect();
         let typical = median(groups.iter().map(|(_, unit)| *unit)).unwrap_or_default();
@@ -417,9 +417,9 @@ mod tests {
     /// Returns the points after they were smoothed, and the noise.
     fn smoothed(points: &[Vec3]) -> (Vec<Vec3>, f32) {
         let cloud = PointCloud::from_positions(points.to_vec());
-        let camera = DepthCamera::find(&cloud).unwrap();
+        let sensor = DepthSensor::find(&cloud).unwrap();
         let mut moved = cloud.positions;
-        let noise = smooth_depths(&mut moved, &camera, &NoProgress).unwrap().unwrap();
+        let noise = smooth_depths(&mut moved, &sensor, &NoProgress).unwrap().unwrap();
         (moved, noise)
     }
 
@@ -498,10 +498,10 @@ mod tests {
     #[test]
     fn points_that_fill_no_image_stay() {
         let mut points = seen(slanted_wall, |_| 0.0);
-        let camera = DepthCamera::find(&PointCloud::from_positions(points.clone())).unwrap();
+        let sensor = DepthSensor::find(&PointCloud::from_positions(points.clone())).unwrap();
         points.retain(|point| (point.x / point.z - point.y / point.z).abs() < 1e-3);
         let mut moved = points.clone();
-        assert_eq!(smooth_depths(&mut moved, &camera, &NoProgress).unwrap(), None);
+        assert_eq!(smooth_depths(&mut moved, &sensor, &NoProgress).unwrap(), None);
         assert_eq!(moved, points);
     }
 }

@@ -21,7 +21,7 @@ const ROUNDING: f32 = 1e-6;
 const N_AVERAGED: usize = 3;
 
 /// The depth camera of a cloud.
-pub struct DepthCamera {
+pub struct DepthSensor {
     /// Position relative to the origin of the cloud.
     pub position: Vec3,
     /// Direction of the view. Both axes of the image are perpendicular to it.
@@ -31,7 +31,7 @@ pub struct DepthCamera {
     depths: Vec<f32>,
 }
 
-impl DepthCamera {
+impl DepthSensor {
     /// Returns the camera of a cloud of one depth camera, none of other clouds.
     pub fn find(cloud: &PointCloud) -> Option<Self> {
         let n_points = cloud.len();
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn steps_of_a_disparity_grow_with_the_square_of_the_depth() {
-        let steps = DepthCamera::find(&slanted(Some(300.0))).unwrap();
+        let steps = DepthSensor::find(&slanted(Some(300.0))).unwrap();
         for depth in [1.5, 2.0, 3.0f32] {
             let expected = depth * depth / 300.0;
             let found = steps.step(depth);
@@ -134,11 +134,11 @@ mod tests {
         let rotation = DQuat::from_rotation_x(0.7) * DQuat::from_rotation_y(0.3);
         let mut cloud = slanted(Some(300.0));
         cloud.positions.iter_mut().for_each(|point| *point = rotation.as_quat() * *point);
-        assert!(DepthCamera::find(&cloud).is_none());
+        assert!(DepthSensor::find(&cloud).is_none());
         cloud.stations = vec![ScanStation { rotation, ..ScanStation::default() }];
-        let camera = DepthCamera::find(&cloud).unwrap();
-        assert!((camera.step(2.0) / (4.0 / 300.0) - 1.0).abs() < 0.1);
-        let seen = camera.project(rotation.as_quat() * Vec3::new(0.6, -0.4, 2.0));
+        let sensor = DepthSensor::find(&cloud).unwrap();
+        assert!((sensor.step(2.0) / (4.0 / 300.0) - 1.0).abs() < 0.1);
+        let seen = sensor.project(rotation.as_quat() * Vec3::new(0.6, -0.4, 2.0));
         assert!(seen.distance(Vec3::new(0.3, -0.2, 0.5)) < 1e-6, "{seen}");
     }
 
@@ -151,20 +151,20 @@ mod tests {
             300.0 / (300.0 / depth(pixel)).round() * Vec3::new(x, y, 1.0)
         };
         let wall = PointCloud::from_positions((0..40_000).map(point).collect());
-        let found = DepthCamera::find(&wall).unwrap().step(2.5);
+        let found = DepthSensor::find(&wall).unwrap().step(2.5);
         assert!((found / (2.5 * 2.5 / 300.0) - 1.0).abs() < 0.1, "{found}");
     }
 
     #[test]
     fn other_clouds_have_no_steps() {
         let grid = (0..40_000).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0));
-        assert!(DepthCamera::find(&PointCloud::from_positions(grid.collect())).is_none());
-        assert!(DepthCamera::find(&slanted(None)).is_none());
+        assert!(DepthSensor::find(&PointCloud::from_positions(grid.collect())).is_none());
+        assert!(DepthSensor::find(&slanted(None)).is_none());
         let flight_lines = (0..40_000).map(|i| {
             let across = (i % 200) as f32 - 100.0;
             Vec3::new(across + 1e-3 * (i as f32).sin(), 0.5 * (i / 200) as f32, (i as f32).cos())
         });
-        assert!(DepthCamera::find(&PointCloud::from_positions(flight_lines.collect())).is_none());
-        assert!(DepthCamera::find(&PointCloud::default()).is_none());
+        assert!(DepthSensor::find(&PointCloud::from_positions(flight_lines.collect())).is_none());
+        assert!(DepthSensor::find(&PointCloud::default()).is_none());
     }
 }
