@@ -18,7 +18,7 @@ use super::structure::point_shape::{PointShape, Structure, StructureChoice, Stru
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
 use super::structure::thin_parts::join_thin_parts;
-use super::structure::vegetation::{count_rough, has_leaves, is_vegetated, land_normal};
+use super::structure::vegetation::{self, count_rough, is_vegetated, land_normal};
 use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
@@ -166,22 +166,22 @@ pub fn find_shapes<'a>(
         None => KdTree::new(&cloud.positions, progress)?,
     };
     let voters = std::mem::take(voters);
-    let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
+    let mut has_leaves = false;
+    let mut shapes = match (preparation.structure, &mut *fits) {
         (StructureChoice::Auto, Some((fits, _))) if is_elevation_grid || has_structure(fits) => {
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });
             let stated_normals = cloud.normals.as_deref();
             let evidence = Evidence { rings, is_elevation_grid, stated_normals };
-            let (mut shapes, mut found) =
-                find_structures(&tree, fits, radii, voters, &evidence, progress)?;
+            let mut shapes = find_structures(&tree, fits, radii, voters, &evidence, progress)?;
             let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
             let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
-            if !has_leaves(cloud, &structures, &shown, || rings.is_some()) {
+            has_leaves = vegetation::has_leaves(cloud, &structures, &shown, || rings.is_some());
+            if !has_leaves {
                 join_thin_parts(&tree, radii, &mut shapes, progress)?;
-                found = StructureReport::of(&shapes);
             }
-            (shapes, found)
+            shapes
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
@@ -193,9 +193,6 @@ pub fn find_shapes<'a>(
     let fits_of_points = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
     let narrowed = free_space.narrow(&tree, fits_of_points, &mut shapes, progress)?;
     narrowed.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
-    if 0 < narrowed.n_lines {
-        found = StructureReport::of(&shapes);
-    }
     let is_land = is_mostly_land(&cloud.positions);
     if let (true, StructureChoice::Auto, Some((fits, _))) = (is_land, preparation.structure, &*fits)
     {
@@ -204,7 +201,6 @@ pub fn find_shapes<'a>(
         // The thickness of walls is chosen for it.
         let noise = typical.noise() * typical.radius;
         find_sparse_walls(&cloud.positions, noise, typical.radius, &mut shapes, progress)?;
-        found = StructureReport::of(&shapes);
     }
     // Those between rings are closed already.
     if !is_by_gap.is_empty() && rings.is_none() {
@@ -227,6 +223,7 @@ pub fn find_shapes<'a>(
     *radii = changed;
     report.update(radii);
     estimates.tree = Some(tree);
+    let found = StructureReport { has_leaves, ..StructureReport::of(&shapes) };
     Ok(Some((shapes, found)))
 }
 

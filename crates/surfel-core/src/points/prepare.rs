@@ -140,13 +140,10 @@ pub fn prepare(
         report.structure = Some(found);
     }
     add_morph_offsets(&mut cloud, &estimated, preparation, progress)?;
-    let cloud = match missing.fits {
-        true => PreparedCloud::with_rings(cloud, |_| rings.is_some())?,
-        false => PreparedCloud::new(cloud)?,
+    let cloud = match &report.structure {
+        Some(found) => PreparedCloud::with_leaves(cloud, found.has_leaves)?,
+        None => PreparedCloud::new(cloud)?,
     };
-    if let Some(found) = &mut report.structure {
-        found.has_leaves = cloud.has_leaves();
-    }
     Ok((cloud, report))
 }
 

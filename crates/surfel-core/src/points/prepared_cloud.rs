@@ -28,21 +28,21 @@ impl PreparedCloud {
     /// have one entry for each point, [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::InvalidPosition`] for a
     /// position that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
     pub fn new(cloud: PointCloud) -> Result<Self> {
-        let has_rings =
-            |cloud: &PointCloud| matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)));
-        Self::with_rings(cloud, has_rings)
+        let mut prepared = Self::with_leaves(cloud, false)?;
+        let cloud = &prepared.cloud;
+        let has_rings = || matches!(ScanRings::find(cloud, &NoProgress), Ok(Some(_)));
+        let shapes = cloud.structures().zip(cloud.radii.as_ref());
+        prepared.has_leaves = shapes
+            .is_some_and(|(structures, radii)| has_leaves(cloud, &structures, radii, has_rings));
+        Ok(prepared)
     }
 
-    /// Wraps a cloud that can be traced as it is. `has_rings` tells whether its points are on the rings of a spinning
-    /// scanner; it is asked only if that decides what scattered points are.
+    /// Wraps a cloud that can be traced as it is, of which it is known whether its scattered points are leaves.
     ///
     /// # Errors
     ///
     /// Returns the errors of [`PreparedCloud::new`].
-    pub(super) fn with_rings(
-        cloud: PointCloud,
-        has_rings: impl FnOnce(&PointCloud) -> bool,
-    ) -> Result<Self> {
+    pub(super) fn with_leaves(cloud: PointCloud, has_leaves: bool) -> Result<Self> {
         check_count(cloud.len())?;
         if cloud.radii.is_none() {
             return Err(Error::MissingColumn { column: "radii" });
@@ -52,14 +52,7 @@ impl PreparedCloud {
         }
         match cloud.positions.par_iter().position_first(|p| !is_valid_position(*p)) {
             Some(point_idx) => Err(Error::InvalidPosition { point_idx }),
-            None => {
-                let structures = cloud.structures();
-                let has_leaves =
-                    structures.zip(cloud.radii.as_ref()).is_some_and(|(all, radii)| {
-                        has_leaves(&cloud, &all, radii, || has_rings(&cloud))
-                    });
-                Ok(Self { cloud, has_leaves })
-            }
+            None => Ok(Self { cloud, has_leaves }),
         }
     }
 
@@ -172,21 +165,25 @@ mod tests {
     }
 
     #[test]
-    fn what_scattered_points_are_follows_the_known_rings_and_stays_in_a_subset() {
-        let n_points = 5000;
-        let structures = (0..n_points).map(|i| u8::from(i < 900) * Structure::Scatter as u8);
-        let structure = Scalar { name: STRUCTURE.into(), values: Values::U8(structures.collect()) };
-        let cloud = PointCloud {
-            radii: Some(vec![0.5; n_points]),
-            scalars: vec![structure],
-            ..PointCloud::from_positions(vec![Vec3::ZERO; n_points])
-        };
-        for has_rings in [true, false] {
-            let prepared = PreparedCloud::with_rings(cloud.clone(), |_| has_rings).unwrap();
-            assert_eq!(prepared.has_leaves(), has_rings);
-            assert_eq!(prepared.subset(&[3]).has_leaves(), has_rings);
+    fn a_subset_keeps_what_scattered_points_are() {
+        for has_leaves in [true, false] {
+            let prepared = PreparedCloud::with_leaves(cloud(), has_leaves).unwrap();
+            assert_eq!(prepared.subset(&[1]).has_leaves(), has_leaves);
         }
-        assert!(!PreparedCloud::new(cloud).unwrap().has_leaves());
+    }
+
+    #[test]
+    fn scattered_points_of_a_loaded_cloud_are_leaves_by_their_class() {
+        let codes = [Structure::Scatter, Structure::Surface].map(|structure| structure as u8);
+        let structure = Scalar { name: STRUCTURE.into(), values: Values::U8(codes.to_vec()) };
+        for (class, expected) in [(5, true), (6, false)] {
+            let loaded = PointCloud {
+                classification: Some(vec![class; 2]),
+                scalars: vec![structure.clone()],
+                ..cloud()
+            };
+            assert_eq!(PreparedCloud::new(loaded).unwrap().has_leaves(), expected);
+        }
     }
 
     #[test]

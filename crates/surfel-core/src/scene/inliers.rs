@@ -122,7 +122,7 @@ fn without_stray_groups(points: Vec<Vec3>) -> Vec<Vec3> {
 fn group_sizes(points: &[Vec3]) -> Vec<u32> {
     /// Maximum number of cells along the longest side of the cloud.
     const MAX_CELLS: usize = 48;
-    /// Minimum number of points for each square of this number of cells: on a surface sparse points touch each other, too.
+    /// Minimum number of points for each cell of a face of the grid: with fewer, sparse points of a surface would not touch.
     const POINTS_PER_CELL: usize = 12;
     let n_cells = (points.len() / POINTS_PER_CELL).isqrt().clamp(1, MAX_CELLS);
     // Number of cells along each axis of the grid, which has a border.

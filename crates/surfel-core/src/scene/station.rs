@@ -37,6 +37,8 @@ const MAX_BEHIND: f64 = 0.25;
 /// Minimum fraction of the normals that face a scanner: it measures no surface from behind. Half of the normals face it if
 /// their signs mean nothing; 0.15 of those of an object face a zero within it.
 const MIN_FACING: f64 = 0.33;
+/// Fraction of the points of a depth camera at each border of its view that may be strays.
+const STRAY_FRACTION: f64 = 0.002;
 /// Horizontal angle that should have most of the far points: that of a picture of 16:9.
 const WINDOW_DEG: usize = 90;
 /// Vertical angle of view in degrees: wider than for objects, as things all around are near.
@@ -104,19 +106,22 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     }
     let ahead = axes.ahead();
     let in_view = offsets.iter().filter(|offset| axes.sees(**offset));
-    let tangents = in_view.map(|offset| offset.truncate() / offset.dot(ahead));
-    let seen = Aabb::of_points(tangents.map(|tangents| tangents.extend(0.0)));
-    let [low, high] = [seen.min, seen.max].map(|corner| corner.as_dvec3().map(f64::atan));
-    let middle = (0.5 * (low + high)).map(f64::tan);
+    let angles = |axis: usize, sign: f32| {
+        let angles = in_view.clone().map(|offset| sign * (offset[axis] / offset.dot(ahead)).atan());
+        quantile(angles, STRAY_FRACTION).map(|angle| sign * angle)
+    };
+    let [low_x, high_x] = [angles(0, 1.0)?, angles(0, -1.0)?].map(f64::from);
+    let [low_y, high_y] = [angles(1, 1.0)?, angles(1, -1.0)?].map(f64::from);
+    let [x, y] = [low_x + high_x, low_y + high_y].map(|sum| (0.5 * sum).tan());
     let points = polar_points(Vec3::ZERO, &offsets, up);
     let [near, median, far] = distances(&points)?;
     let is_scan =
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
     is_scan.then(|| InsideView {
         position: DVec3::ZERO,
-        direction: (middle + ahead.as_dvec3()).normalize(),
+        direction: (DVec3::new(x, y, 0.0) + ahead.as_dvec3()).normalize(),
         distance: median.into(),
-        view_angle_deg: (high.y - low.y).to_degrees(),
+        view_angle_deg: (high_y - low_y).to_degrees(),
     })
 }
 
@@ -280,6 +285,7 @@ mod tests {
     fn a_depth_image_without_its_left_side_is_seen_in_the_middle() {
         let mut cloud = depth_image(false);
         cloud.positions.retain(|point| -0.1 * point.z < point.x);
+        cloud.positions.push(Vec3::new(-1.1, 0.0, 1.0));
         let station = find_depth_camera(&cloud, Vec3::NEG_Y).unwrap();
         let angle = f64::atan2(station.direction.x, station.direction.z);
         assert!((angle - 0.5 * (0.5f64.atan() - 0.1f64.atan())).abs() < 5e-3, "{angle}");

@@ -51,6 +51,9 @@ impl Default for DepthCamera {
     }
 }
 
+/// Maximum width of the windows by which disparities are measured.
+const MAX_WINDOW: usize = 64;
+
 /// The axes of a pose: right, up, ahead.
 fn axes((position, target): (DVec3, DVec3)) -> [DVec3; 3] {
     let ahead = (target - position).normalize();
@@ -114,7 +117,8 @@ impl Instrument for DepthCamera {
         check(is_angle, "view_angle_rad", self.view_angle_rad, "between 0 and pi")?;
         check_not_negative("noise_at_1_m", self.noise_at_1_m)?;
         check_not_negative("step_at_1_m", self.step_at_1_m)?;
-        check_positive("window", self.window as f64)?;
+        let is_window = (1..=MAX_WINDOW).contains(&self.window);
+        check(is_window, "window", self.window as f64, "between 1 and 64")?;
         for (position, target) in &self.poses {
             let level = (target - position).truncate().length();
             check(0.0 < level, "direction of a pose", level, "one that is not vertical")?;
@@ -182,6 +186,29 @@ mod tests {
         };
         let ratio = deviation(4.0) / deviation(1.0);
         assert!((14.0..18.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn noise_is_alike_within_a_window() {
+        let camera = DepthCamera { window: 8, width: 64, height: 64, ..DepthCamera::default() };
+        let noise = |x: usize, y: usize| camera.noise(0, x, y);
+        let pixels = (0..56 * 64).map(|i| (i % 56, i / 56));
+        let product = |step: usize| {
+            pixels.clone().map(|(x, y)| noise(x, y) * noise(x + step, y)).sum::<f64>()
+        };
+        let variance = product(0) / (56.0 * 64.0);
+        assert!((0.7..1.3).contains(&variance), "{variance}");
+        let [near, far] = [product(2), product(8)].map(|sum| sum / product(0));
+        assert!((0.65..0.85).contains(&near) && far.abs() < 0.2, "{near} {far}");
+    }
+
+    #[test]
+    fn windows_are_limited() {
+        for window in [0, 65, usize::MAX] {
+            let camera = DepthCamera { window, ..DepthCamera::default() };
+            let error = camera.scan(&SdfScene::default(), &NoProgress).unwrap_err().to_string();
+            assert!(error.contains("window"), "{error}");
+        }
     }
 
     #[test]

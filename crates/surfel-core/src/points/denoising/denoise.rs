@@ -48,7 +48,7 @@ pub enum Denoise {
     #[default]
     Auto,
     /// Points are moved however little noise there is. Plants, points that fill space and animated clouds stay, and of clouds with
-    /// many leaves all but clear surfaces.
+    /// many leaves all but clear surfaces. Those of a depth image move along their rays, by some steps of its disparities at most.
     On,
     /// All points stay where they are.
     Off,
@@ -57,7 +57,8 @@ pub enum Denoise {
 /// Effect of denoising.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DenoiseReport {
-    /// Median noise over the regions of surfaces: the standard deviation of points from their surface, in spacings.
+    /// Median noise over the regions of surfaces: the standard deviation of points from their surface, in spacings. In a depth
+    /// image that of the depths, in pixels.
     pub noise: f32,
     /// Number of points that were moved.
     pub n_moved: usize,
@@ -109,6 +110,11 @@ pub fn denoise(
         Some(sensor) => smooth_depths(&mut cloud.positions, &sensor, progress)?,
         None => None,
     };
+    let is_noisy = depth_noise.is_some_and(|noise| !is_auto || MIN_NOISE <= noise);
+    let depth_noise = depth_noise.filter(|_| is_noisy);
+    if !is_noisy {
+        cloud.positions.clone_from(&measured);
+    }
     let found = denoise_surfaces(cloud, is_auto, progress)?;
     let (noise, normals) = match (depth_noise, found) {
         (None, None) => return Ok(None),

@@ -1,8 +1,8 @@
 //! Depth images: the points of a depth camera, moved along their rays onto the surface that the pixels around describe.
 //!
-//! A depth camera measures disparities, the reciprocals of depths, with an error that hardly depends on the depth. Planes of
-//! space are planes over its image, too. So far walls, whose depths jump by centimetres between pixels, are smoothed as near
-//! ones are.
+//! Stereo and structured light measure disparities, to which the inverse of the depth is proportional, with an error that
+//! hardly depends on the depth. Planes of space are planes over the image, too. So far walls, whose depths jump by centimetres
+//! between pixels, are smoothed as near ones are. Here a disparity is the inverse of a depth.
 //!
 //! Each pixel gets the plane through those around it whose disparities are near that plane (a biweight estimator). Its window
 //! grows as long as one plane explains the pixels in it. Wide windows look at pixels farther apart, each of which stands for
@@ -53,8 +53,13 @@ const N_GROUPS: usize = 16;
 const MIN_GROUP_SIZE: usize = 256;
 /// Maximum ratio of the unit of a group to the median: rough things fill a group of their own.
 const MAX_UNIT_RATIO: f32 = 8.0;
-/// Maximum number of pixels for each point, and further ones: scattered points form no image.
+/// Maximum number of pixels for each point.
 const MAX_PIXELS_PER_POINT: usize = 16;
+/// Minimum fraction of the measured pixels whose next one along a row or a column was measured, too. Scattered points, which
+/// form no image, have 0.2.
+const MIN_PAIRED: f32 = 0.6;
+/// Minimum ratio of a smoothed disparity to the measured one: of far points the noise may be as large as the disparity.
+const MIN_DISPARITY_RATIO: f32 = 0.5;
 /// Ratio of the standard deviation of a normal distribution to the median distance from its mean.
 const DEVIATION_PER_MEDIAN: f32 = 1.4826;
 
@@ -62,8 +67,9 @@ const DEVIATION_PER_MEDIAN: f32 = 1.4826;
 struct DepthImage {
     width: usize,
     height: usize,
-    /// Tangents of the angles to the pixel of least coordinates, and from one pixel to the next.
+    /// Tangents of the angles from the view to the first column and the first row.
     first: [f32; 2],
+    /// Difference of the tangents from one pixel to the next.
     pixel_size: f32,
     units: Units,
     /// Row by row; none where nothing was measured.
@@ -107,11 +113,13 @@ pub fn smooth_depths(
     sensor: &DepthSensor,
     progress: &dyn Progress,
 ) -> Result<Option<f32>> {
-    let projected: Vec<Vec3> = positions.par_iter().map(|point| sensor.project(*point)).collect();
+    let projected: Vec<Option<Vec3>> =
+        positions.par_iter().map(|point| sensor.project(*point)).collect();
     let Some(image) = DepthImage::new(&projected, sensor, progress)? else { return Ok(None) };
     let planes = image.planes(progress)?;
-    let move_point = |(position, projected): (&mut Vec3, &Vec3)| {
-        let disparity = image.smoothed(&planes, *projected)?;
+    let move_point = |(position, projected): (&mut Vec3, &Option<Vec3>)| {
+        let projected = (*projected)?;
+        let disparity = image.smoothed(&planes, projected)?;
         *position = sensor.position + (*position - sensor.position) * (projected.z / disparity);
         Some((1.0 - projected.z / disparity).abs() / image.pixel_size)
     };
@@ -122,18 +130,19 @@ pub fn smooth_depths(
 impl DepthImage {
     /// Makes an image of points by their tangents and disparities. Of several in a pixel the first one counts.
     fn new(
-        projected: &[Vec3],
+        projected: &[Option<Vec3>],
         sensor: &DepthSensor,
         progress: &dyn Progress,
     ) -> Result<Option<Self>> {
-        let seen: Vec<Vec3> = projected.iter().copied().filter(|point| 0.0 < point.z).collect();
+        let seen: Vec<Vec3> = projected.iter().copied().flatten().collect();
         let Some(pixel_size) = pixel_size(&seen, progress)? else { return Ok(None) };
         let (low, high) =
             seen.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
                 (low.min(*p), high.max(*p))
             });
-        let [width, height] =
-            [high.x - low.x, high.y - low.y].map(|extent| (extent / pixel_size) as usize + 2);
+        let [width, height] = [high.x - low.x, high.y - low.y]
+            .map(|extent| (extent / pixel_size) as usize)
+            .map(|n| n.saturating_add(2));
         if MAX_PIXELS_PER_POINT * seen.len() < width.saturating_mul(height) {
             return Ok(None);
         }
@@ -150,8 +159,25 @@ impl DepthImage {
             let slot = image.pixel(&sample);
             image.samples[slot].get_or_insert(sample);
         }
+        if !image.is_dense() {
+            return Ok(None);
+        }
         image.units = Units::of_image(&image, sensor);
         Ok(Some(image))
+    }
+
+    /// Returns true if the neighbours of most pixels were measured as well.
+    fn is_dense(&self) -> bool {
+        let is_measured = |pixel: usize| self.samples.get(pixel).is_some_and(Option::is_some);
+        let measured = (0..self.samples.len()).filter(|pixel| is_measured(*pixel));
+        let [n_measured, n_along_rows, n_along_columns] =
+            measured.fold([0u32; 3], |[n, x, y], pixel| {
+                let [next, below] =
+                    [pixel + 1, pixel + self.width].map(|it| u32::from(is_measured(it)));
+                [n + 1, x + next, y + below]
+            });
+        let min_pairs = MIN_PAIRED * n_measured as f32;
+        min_pairs <= n_along_rows as f32 && min_pairs <= n_along_columns as f32
     }
 
     fn sample(&self, projected: Vec3) -> Sample {
@@ -167,26 +193,23 @@ impl DepthImage {
 
     /// Returns the disparity of the surface at a point, or none where it is not known or that of another surface.
     fn smoothed(&self, planes: &[Plane], projected: Vec3) -> Option<f32> {
-        if projected.z <= 0.0 {
-            return None;
-        }
         let point = self.sample(projected);
         let pixel = self.pixel(&point);
         let (sample, plane) = (self.samples[pixel]?, planes[pixel]);
         let disparity = plane.at(point.x - sample.x, point.y - sample.y);
         let is_known = plane.is_known
-            && 0.0 < disparity
+            && MIN_DISPARITY_RATIO * point.disparity < disparity
             && (disparity - point.disparity).abs() <= MAX_STRAY * self.units.at(disparity);
         is_known.then_some(disparity)
     }
 
     /// Returns the surface at each pixel.
     fn planes(&self, progress: &dyn Progress) -> Result<Vec<Plane>> {
-        let across = |sample: &Option<Sample>| {
+        let unfitted = |sample: &Option<Sample>| {
             let disparity = sample.map_or(0.0, |sample| sample.disparity);
             Plane { disparity, ..Plane::default() }
         };
-        let mut planes: Vec<Plane> = self.samples.iter().map(across).collect();
+        let mut planes: Vec<Plane> = self.samples.iter().map(unfitted).collect();
         progress.begin("depth image", (WINDOWS.len() * self.height) as u64);
         for window in &WINDOWS {
             let widened = |pixel: usize| self.widened(window, &planes, pixel);
@@ -270,7 +293,9 @@ impl Units {
             let [before, own, after] = [three[0]?, three[1]?, three[2]?].map(|it| it.disparity);
             Some((own, (before - 2.0 * own + after).abs()))
         };
-        let mut bends: Vec<(f32, f32)> = image.samples.windows(3).filter_map(bend).collect();
+        let rows = image.samples.chunks(image.width);
+        let mut bends: Vec<(f32, f32)> =
+            rows.flat_map(|row| row.windows(3)).filter_map(bend).collect();
         bends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let size = bends.len().div_ceil(N_GROUPS).max(MIN_GROUP_SIZE);
         let unit = |group: &[(f32, f32)]| {
@@ -307,9 +332,8 @@ impl Plane {
 /// A plane fitted to the pixels of a window.
 struct Fit {
     plane: Plane,
-    /// Number of pixels near the plane.
+    /// Number of pixels near the plane before the last change, and their weighted root mean square distance from it.
     n_near: usize,
-    /// Root mean square distance of these.
     error: f32,
 }
 
@@ -493,6 +517,28 @@ mod tests {
         let n_far = points.iter().enumerate().filter(|(pixel, _)| error(*pixel) == 30.0).count();
         assert!(left[left.len() - n_far - 1] < 1.0, "{}", left[left.len() - n_far - 1]);
         assert!(25.0 < left[left.len() - n_far]);
+    }
+
+    #[test]
+    fn scattered_points_form_no_image() {
+        // A part of the points, moved within their pixels and more.
+        let mut random = Random::new(5, 0);
+        let mut next = || (random.next_f32() - 0.5) / 20.0;
+        let mut points = seen(slanted_wall, |_| 0.0);
+        points.iter_mut().for_each(|point| *point += point.z * Vec3::new(next(), next(), 0.0));
+        let sensor = DepthSensor::find(&PointCloud::from_positions(points.clone())).unwrap();
+        let mut moved = points.clone();
+        assert_eq!(smooth_depths(&mut moved, &sensor, &NoProgress).unwrap(), None);
+        assert_eq!(moved, points);
+    }
+
+    #[test]
+    fn a_point_beside_the_camera_does_not_keep_others_from_moving() {
+        let mut points = seen(slanted_wall, |_| 0.0);
+        points.extend([Vec3::new(5.0, 0.0, 1e-3), Vec3::X, Vec3::ZERO]);
+        let (moved, _) = smoothed(&points);
+        assert_eq!(moved[moved.len() - 3..], points[points.len() - 3..]);
+        assert!(moved[0] != points[0]);
     }
 
     #[test]

@@ -69,12 +69,13 @@ impl DepthSensor {
     }
 
     /// Returns where a point is in the image, as the tangents of its angles from the view along both axes, and its disparity, the
-    /// reciprocal of its depth. Points beside the camera or behind it have a disparity of at most 0.
-    pub fn project(&self, point: Vec3) -> Vec3 {
+    /// reciprocal of its depth; none beyond the field of view.
+    pub fn project(&self, point: Vec3) -> Option<Vec3> {
         let offset = point - self.position;
-        let disparity = offset.dot(self.ahead).recip();
-        let [x, y] = self.image_axes.map(|axis| offset.dot(axis) * disparity);
-        Vec3::new(x, y, disparity)
+        let [x, y] = self.image_axes.map(|axis| offset.dot(axis));
+        let depth = offset.dot(self.ahead);
+        let is_seen = CameraAxes::YDown.sees(Vec3::new(x, y, depth));
+        is_seen.then(|| Vec3::new(x, y, 1.0) / depth)
     }
 
     /// Returns the difference of the disparities around one.
@@ -138,8 +139,12 @@ mod tests {
         cloud.stations = vec![ScanStation { rotation, ..ScanStation::default() }];
         let sensor = DepthSensor::find(&cloud).unwrap();
         assert!((sensor.step(2.0) / (4.0 / 300.0) - 1.0).abs() < 0.1);
-        let seen = sensor.project(rotation.as_quat() * Vec3::new(0.6, -0.4, 2.0));
+        let project = |point: Vec3| sensor.project(rotation.as_quat() * point);
+        let seen = project(Vec3::new(0.6, -0.4, 2.0)).unwrap();
         assert!(seen.distance(Vec3::new(0.3, -0.2, 0.5)) < 1e-6, "{seen}");
+        for beside in [Vec3::new(0.6, -0.4, -2.0), Vec3::X, Vec3::ZERO, Vec3::NAN] {
+            assert_eq!(project(beside), None);
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::crown_patches::scatter_crown_patches;
 use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
 use super::junctions::join_to_surfaces;
 use super::neighborhood_stats::Typical;
-use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_surface};
+use super::point_shape::{PointShape, Structure, is_line, is_surface};
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
 use super::see_through::open_see_through_discs;
@@ -67,7 +67,7 @@ pub fn find_structures(
     voters: Vec<Voters>,
     evidence: &Evidence,
     progress: &dyn Progress,
-) -> Result<(Vec<PointShape>, StructureReport)> {
+) -> Result<Vec<PointShape>> {
     let Evidence { rings, is_elevation_grid, stated_normals } = *evidence;
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
@@ -136,8 +136,7 @@ pub fn find_structures(
         None => clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size),
     }
     limit_stray_points(tree, &mut shapes, progress)?;
-    let report = StructureReport::of(&shapes);
-    Ok((shapes, report))
+    Ok(shapes)
 }
 
 /// Makes each point stand for itself.
@@ -149,7 +148,7 @@ pub fn all_scattered(
     tree: &KdTree,
     radii: &[f32],
     progress: &dyn Progress,
-) -> Result<(Vec<PointShape>, StructureReport)> {
+) -> Result<Vec<PointShape>> {
     let distance = |point: usize, neighbors: &[Neighbor]| second_distance(tree, point, neighbors);
     let distances = tree.map(Neighborhood::Nearest(2), progress, distance)?;
     let shape = |(distance, radius): (&f32, &f32)| PointShape {
@@ -160,8 +159,7 @@ pub fn all_scattered(
     let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
     let size = Aabb::of_points(tree.positions().iter().copied()).diagonal();
     clamp_solids(&mut shapes, Structure::Scatter, f32::INFINITY, size);
-    let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
-    Ok((shapes, report))
+    Ok(shapes)
 }
 
 /// The shape of a point by its nearest neighbours alone.

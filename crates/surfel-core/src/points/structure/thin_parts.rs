@@ -4,6 +4,7 @@
 use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure, is_surface};
 use crate::error::Result;
+use crate::math::Vec3;
 use crate::points::neighbors::KdTree;
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
@@ -11,6 +12,8 @@ use rayon::prelude::*;
 
 /// Number of neighbours on one side of a thin part.
 const N_NEIGHBORS: usize = 8;
+/// Distance of linked points in radii of either: stray points are farther.
+const MAX_LINK: f32 = 2.0;
 /// Minimum number of points of a part.
 const MIN_POINTS: usize = 16;
 /// Minimum fraction of the points of a part whose neighbours lie in a plane. Noise has 0.1 to 0.4.
@@ -29,18 +32,22 @@ pub fn join_thin_parts(
     progress: &dyn Progress,
 ) -> Result<()> {
     let is_scattered = |point: usize| shapes[point].structure == Structure::Scatter;
-    let parts = connected_parts(tree, is_scattered, |_, _| true, progress)?;
     let positions = tree.positions();
-    let fit = |point: &u32| {
+    let is_linked = |point: usize, other: usize| {
+        let reach = MAX_LINK * radii[point].min(radii[other]);
+        positions[point].distance(positions[other]) < reach
+    };
+    let parts = connected_parts(tree, is_scattered, is_linked, progress)?;
+    let fit = |point: &u32| -> Result<PlaneFit> {
+        progress.check()?;
         let neighbors = tree.nearest(positions[*point as usize], N_NEIGHBORS, Some(*point));
-        fit_plane(positions, *point as usize, &neighbors)
+        Ok(fit_plane(positions, *point as usize, &neighbors))
     };
     let even_fits = |part: &Vec<u32>| -> Result<Option<Vec<PlaneFit>>> {
-        progress.check()?;
         if part.len() < MIN_POINTS {
             return Ok(None);
         }
-        let fits: Vec<PlaneFit> = part.par_iter().map(fit).collect();
+        let fits = part.par_iter().map(fit).collect::<Result<Vec<_>>>()?;
         let n_even = fits.iter().filter(|fit| is_surface(fit)).count();
         Ok((MIN_EVEN * part.len() as f32 <= n_even as f32).then_some(fits))
     };
@@ -48,11 +55,10 @@ pub fn join_thin_parts(
     for (part, fits) in parts.iter().zip(fits) {
         for (point, fit) in part.iter().zip(fits.into_iter().flatten()) {
             let point = *point as usize;
-            shapes[point] = PointShape {
-                structure: Structure::Surface,
-                normal: fit.normal,
-                radius: radii[point],
-            };
+            if fit.normal != Vec3::ZERO {
+                let (structure, normal, radius) = (Structure::Surface, fit.normal, radii[point]);
+                shapes[point] = PointShape { structure, normal, radius };
+            }
         }
     }
     Ok(())
@@ -63,7 +69,7 @@ mod tests {
     //! Fingers and stray points.
 
     use super::*;
-    use crate::math::{Random, Vec3};
+    use crate::math::Random;
     use crate::points::test_clouds::prepared;
     use std::f32::consts::TAU;
 
