@@ -4,7 +4,7 @@
 use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure, is_surface};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, sampled_quantile};
 use crate::points::neighbors::KdTree;
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::progress::Progress;
@@ -12,6 +12,8 @@ use rayon::prelude::*;
 
 /// Number of neighbours on one side of a thin part.
 const N_NEIGHBORS: usize = 8;
+/// Maximum ratio of the radius of a point to the median of all: sparse points far from others would make shards.
+const MAX_RADIUS: f32 = 4.0;
 /// Distance of linked points in radii of either: stray points are farther.
 const MAX_LINK: f32 = 2.0;
 /// Minimum number of points of a part.
@@ -31,7 +33,9 @@ pub fn join_thin_parts(
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
-    let is_scattered = |point: usize| shapes[point].structure == Structure::Scatter;
+    let max_radius = MAX_RADIUS * sampled_quantile(radii, 0.5);
+    let is_scattered =
+        |point: usize| shapes[point].structure == Structure::Scatter && radii[point] <= max_radius;
     let positions = tree.positions();
     let is_linked = |point: usize, other: usize| {
         let reach = MAX_LINK * radii[point].min(radii[other]);
