@@ -9,43 +9,27 @@
 //! its own smaller window (as in the transform à trous of Holschneider et al. 1989).
 
 use super::depth_sensor::DepthSensor;
+use super::disparity_plane::{DisparityFit, DisparityPlane, DisparitySample, ImageWindow};
 use crate::error::Result;
-use crate::math::{DMat3, DVec3, Random, Vec3, median};
+use crate::math::{Random, Vec3, median};
 use crate::points::neighbors::KdTree;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// The pixels around a pixel that take part in its plane. Lengths are in pixels, disparities in the unit at the pixel.
-struct Window {
-    radius: isize,
-    /// Distance between the pixels that take part.
-    stride: isize,
-    /// Distance of a disparity from the plane from which it takes no part.
-    max_distance: f32,
-    /// Root mean square distance from which the plane of the smaller window stays.
-    max_error: f32,
-}
-
-const WINDOWS: [Window; 5] = [
-    Window { radius: 2, stride: 1, max_distance: 2.5, max_error: f32::INFINITY },
-    Window { radius: 4, stride: 1, max_distance: 2.0, max_error: 0.7 },
-    Window { radius: 8, stride: 2, max_distance: 1.6, max_error: 0.5 },
-    Window { radius: 16, stride: 4, max_distance: 1.2, max_error: 0.42 },
-    Window { radius: 32, stride: 8, max_distance: 0.9, max_error: 0.32 },
+/// The windows around a pixel, one after another.
+const WINDOWS: [ImageWindow; 5] = [
+    ImageWindow { radius: 2, stride: 1, max_distance: 2.5, max_error: f32::INFINITY },
+    ImageWindow { radius: 4, stride: 1, max_distance: 2.0, max_error: 0.7 },
+    ImageWindow { radius: 8, stride: 2, max_distance: 1.6, max_error: 0.5 },
+    ImageWindow { radius: 16, stride: 4, max_distance: 1.2, max_error: 0.42 },
+    ImageWindow { radius: 32, stride: 8, max_distance: 0.9, max_error: 0.32 },
 ];
-/// Fraction of [`Window::max_error`] up to which the plane of the smaller window has no weight.
+/// Fraction of [`ImageWindow::max_error`] up to which the plane of the smaller window has no weight.
 const FULLY_EXPLAINED: f32 = 0.6;
-/// Number of times that a plane is fitted, each time with weights by the one before.
-const N_FITS: usize = 2;
-/// Minimum fraction of the pixels in a window near its plane, and minimum number of them.
-const MIN_NEAR: f32 = 0.4;
-const MIN_PIXELS: usize = 6;
 /// Maximum distance of a stray disparity from the surface that most pixels around it describe.
 const MAX_STRAY: f32 = 5.0;
 /// Standard deviation of disparities in their unit. That of rounded disparities is about a third of their step.
 const NOISE_PER_UNIT: f32 = 0.3;
-/// Weight of a change of slopes, as a fraction of that of the disparities: pixels in a line determine no plane.
-const STIFFNESS: f64 = 1e-4;
 /// Number of points that the size of pixels is measured at.
 const N_SAMPLES: usize = 8192;
 /// Number of groups of pixels by their disparity whose noise is measured, and least number of pixels of a group.
@@ -73,7 +57,7 @@ struct DepthImage {
     pixel_size: f32,
     units: Units,
     /// Row by row; none where nothing was measured.
-    samples: Vec<Option<Sample>>,
+    samples: Vec<Option<DisparitySample>>,
 }
 
 /// Units of disparities, which grow with the noise: at least the step between disparities, and three times their standard
@@ -82,24 +66,6 @@ struct DepthImage {
 struct Units {
     /// Disparities in ascending order, each with the unit there.
     groups: Vec<(f32, f32)>,
-}
-
-/// A measured disparity, and where in the image it was measured, in pixels.
-#[derive(Clone, Copy)]
-struct Sample {
-    x: f32,
-    y: f32,
-    disparity: f32,
-}
-
-/// The surface at a pixel.
-#[derive(Clone, Copy, Default)]
-struct Plane {
-    disparity: f32,
-    /// Change of the disparity from pixel to pixel along both axes.
-    slope: [f32; 2],
-    /// True if the plane was fitted to a window.
-    is_known: bool,
 }
 
 /// Moves the points of a depth camera onto their surface. Returns the noise, the standard deviation of their depths in
@@ -163,7 +129,7 @@ impl DepthImage {
             return Ok(None);
         }
         image.units = Units::of_image(&image, sensor);
-        Ok(Some(image))
+        Ok((!image.units.groups.is_empty()).then_some(image))
     }
 
     /// Returns true if the neighbours of most pixels were measured as well.
@@ -180,19 +146,19 @@ impl DepthImage {
         min_pairs <= n_along_rows as f32 && min_pairs <= n_along_columns as f32
     }
 
-    fn sample(&self, projected: Vec3) -> Sample {
+    fn sample(&self, projected: Vec3) -> DisparitySample {
         let [x, y] = [projected.x - self.first[0], projected.y - self.first[1]]
             .map(|at| at / self.pixel_size);
-        Sample { x, y, disparity: projected.z }
+        DisparitySample { x, y, disparity: projected.z }
     }
 
     /// Returns the index of the pixel of a sample.
-    fn pixel(&self, sample: &Sample) -> usize {
+    fn pixel(&self, sample: &DisparitySample) -> usize {
         sample.y.round() as usize * self.width + sample.x.round() as usize
     }
 
     /// Returns the disparity of the surface at a point, or none where it is not known or that of another surface.
-    fn smoothed(&self, planes: &[Plane], projected: Vec3) -> Option<f32> {
+    fn smoothed(&self, planes: &[DisparityPlane], projected: Vec3) -> Option<f32> {
         let point = self.sample(projected);
         let pixel = self.pixel(&point);
         let (sample, plane) = (self.samples[pixel]?, planes[pixel]);
@@ -204,12 +170,12 @@ impl DepthImage {
     }
 
     /// Returns the surface at each pixel.
-    fn planes(&self, progress: &dyn Progress) -> Result<Vec<Plane>> {
-        let unfitted = |sample: &Option<Sample>| {
+    fn planes(&self, progress: &dyn Progress) -> Result<Vec<DisparityPlane>> {
+        let unfitted = |sample: &Option<DisparitySample>| {
             let disparity = sample.map_or(0.0, |sample| sample.disparity);
-            Plane { disparity, ..Plane::default() }
+            DisparityPlane { disparity, ..DisparityPlane::default() }
         };
-        let mut planes: Vec<Plane> = self.samples.iter().map(unfitted).collect();
+        let mut planes: Vec<DisparityPlane> = self.samples.iter().map(unfitted).collect();
         progress.begin("depth image", (WINDOWS.len() * self.height) as u64);
         for window in &WINDOWS {
             let widened = |pixel: usize| self.widened(window, &planes, pixel);
@@ -218,7 +184,7 @@ impl DepthImage {
                 progress.advance(1);
                 Ok((y * self.width..(y + 1) * self.width).map(widened).collect())
             };
-            let rows: Vec<Vec<Plane>> =
+            let rows: Vec<Vec<DisparityPlane>> =
                 (0..self.height).into_par_iter().map(row).collect::<Result<_>>()?;
             planes = rows.into_iter().flatten().collect();
         }
@@ -226,17 +192,22 @@ impl DepthImage {
     }
 
     /// Returns the plane of a pixel after it was fitted to a window, as far as it explains the pixels there.
-    fn widened(&self, window: &Window, planes: &[Plane], pixel: usize) -> Plane {
+    fn widened(
+        &self,
+        window: &ImageWindow,
+        planes: &[DisparityPlane],
+        pixel: usize,
+    ) -> DisparityPlane {
         let own = planes[pixel];
         let Some(center) = self.samples[pixel] else { return own };
         let pixels = self.window(window, planes, pixel, &center);
         let unit = self.units.at(own.disparity);
-        let mut fit = Fit::new(&pixels, window, unit, own);
+        let mut fit = DisparityFit::new(&pixels, window, unit, own);
         if !own.is_known && !fit.is_supported(pixels.len()) {
             // A stray disparity starts from that of most others.
             let disparities = pixels.iter().map(|sample| sample.disparity);
             let disparity = median(disparities).unwrap_or(own.disparity);
-            fit = Fit::new(&pixels, window, unit, Plane { disparity, ..own });
+            fit = DisparityFit::new(&pixels, window, unit, DisparityPlane { disparity, ..own });
             if MAX_STRAY * unit < (fit.plane.disparity - own.disparity).abs() {
                 return own;
             }
@@ -252,17 +223,17 @@ impl DepthImage {
         let mix = |a: f32, b: f32| a + weight * (b - a);
         let [x, y] = [0, 1].map(|axis| mix(own.slope[axis], fit.plane.slope[axis]));
         let disparity = mix(own.disparity, fit.plane.disparity);
-        Plane { disparity, slope: [x, y], is_known: true }
+        DisparityPlane { disparity, slope: [x, y], is_known: true }
     }
 
     /// Returns the surface at the pixels in a window around a pixel, relative to its sample.
     fn window(
         &self,
-        window: &Window,
-        planes: &[Plane],
+        window: &ImageWindow,
+        planes: &[DisparityPlane],
         pixel: usize,
-        center: &Sample,
-    ) -> Vec<Sample> {
+        center: &DisparitySample,
+    ) -> Vec<DisparitySample> {
         let [row, column] = [pixel / self.width, pixel % self.width].map(|at| at as isize);
         let inside = |center: isize, size: usize| {
             let steps = -window.radius / window.stride..=window.radius / window.stride;
@@ -274,7 +245,7 @@ impl DepthImage {
             for x in inside(column, self.width) {
                 let other = y * self.width + x;
                 if let Some(sample) = self.samples[other] {
-                    found.push(Sample {
+                    found.push(DisparitySample {
                         x: sample.x - center.x,
                         y: sample.y - center.y,
                         disparity: planes[other].disparity,
@@ -289,7 +260,7 @@ impl DepthImage {
 impl Units {
     /// Measures the units of an image by the distances of pixels from the lines through those beside them.
     fn of_image(image: &DepthImage, sensor: &DepthSensor) -> Self {
-        let bend = |three: &[Option<Sample>]| {
+        let bend = |three: &[Option<DisparitySample>]| {
             let [before, own, after] = [three[0]?, three[1]?, three[2]?].map(|it| it.disparity);
             Some((own, (before - 2.0 * own + after).abs()))
         };
@@ -319,84 +290,6 @@ impl Units {
         let ((low, low_unit), (high, high_unit)) = (group(above.saturating_sub(1)), group(above));
         let fraction = ((disparity - low) / (high - low).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         low_unit + fraction * (high_unit - low_unit)
-    }
-}
-
-impl Plane {
-    /// Returns the disparity at an offset from the pixel.
-    fn at(&self, x: f32, y: f32) -> f32 {
-        self.disparity + self.slope[0] * x + self.slope[1] * y
-    }
-}
-
-/// A plane fitted to the pixels of a window.
-struct Fit {
-    plane: Plane,
-    /// Number of pixels near the plane before the last change, and their weighted root mean square distance from it.
-    n_near: usize,
-    error: f32,
-}
-
-impl Fit {
-    fn new(pixels: &[Sample], window: &Window, unit: f32, start: Plane) -> Self {
-        let mut fit = Self { plane: start, n_near: 0, error: 0.0 };
-        for _ in 0..N_FITS {
-            fit.refine(pixels, window, unit);
-        }
-        fit
-    }
-
-    /// Fits the plane to the pixels that are near it.
-    fn refine(&mut self, pixels: &[Sample], window: &Window, unit: f32) {
-        let per_reach = 1.0 / ((window.radius + window.stride) as f32).powi(2);
-        let per_distance = 1.0 / (window.max_distance * unit).powi(2);
-        let [mut w, mut wx, mut wy, mut wxx, mut wxy, mut wyy] = [0.0f32; 6];
-        let [mut wd, mut wxd, mut wyd, mut wdd] = [0.0f32; 4];
-        let mut n_near = 0;
-        for &Sample { x, y, disparity } in pixels {
-            let distance = disparity - self.plane.at(x, y);
-            let nearness = 1.0 - distance * distance * per_distance;
-            let closeness = (1.0 - (x * x + y * y) * per_reach).max(0.0);
-            if nearness <= 0.0 || closeness == 0.0 {
-                continue;
-            }
-            n_near += 1;
-            let weight = nearness * nearness * closeness * closeness;
-            w += weight;
-            wx += weight * x;
-            wy += weight * y;
-            wxx += weight * x * x;
-            wxy += weight * x * y;
-            wyy += weight * y * y;
-            wd += weight * distance;
-            wxd += weight * x * distance;
-            wyd += weight * y * distance;
-            wdd += weight * distance * distance;
-        }
-        self.n_near = n_near;
-        if w <= 0.0 {
-            return;
-        }
-        let stiff = STIFFNESS * f64::from(w);
-        let [w, wx, wy, wxx, wxy, wyy, wd, wxd, wyd] =
-            [w, wx, wy, wxx, wxy, wyy, wd, wxd, wyd].map(f64::from);
-        let matrix = DMat3::from_cols(
-            DVec3::new(w, wx, wy),
-            DVec3::new(wx, wxx + stiff, wxy),
-            DVec3::new(wy, wxy, wyy + stiff),
-        );
-        let change = (matrix.inverse() * DVec3::new(wd, wxd, wyd)).as_vec3();
-        if change.is_finite() {
-            self.plane.disparity += change.x;
-            self.plane.slope[0] += change.y;
-            self.plane.slope[1] += change.z;
-        }
-        self.error = (wdd / w as f32).sqrt();
-    }
-
-    /// True if enough of the pixels are near the plane.
-    fn is_supported(&self, n_pixels: usize) -> bool {
-        MIN_PIXELS <= self.n_near && MIN_NEAR * n_pixels as f32 <= self.n_near as f32
     }
 }
 

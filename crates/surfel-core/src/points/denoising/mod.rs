@@ -4,6 +4,7 @@
 //! A file uses only those above it.
 
 pub mod depth_sensor;
+pub mod disparity_plane;
 pub mod depth_image;
 pub mod flat_faces;
 pub mod noise_at_point;
