@@ -4,7 +4,7 @@
 //! edges (bilateral filter), and each point moves along its normal onto the weighted mean of its neighbours' planes
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
-use super::depth_image::smooth_depths;
+use super::depth_image::{MovedPoints, smooth_depths};
 use super::depth_sensor::DepthSensor;
 use super::flat_faces::{FlatFaces, SupportPoints};
 use super::noise::Noise;
@@ -105,22 +105,24 @@ pub fn denoise(
     if is_animated || choice == Denoise::Off || (is_auto && cloud.radii.is_some()) {
         return Ok(None);
     }
-    let measured = cloud.positions.clone();
-    let depth_noise = match DepthSensor::find(cloud) {
-        Some(sensor) => smooth_depths(&mut cloud.positions, &sensor, progress)?,
+    let of_image = match DepthSensor::find(cloud) {
+        Some(sensor) => smooth_depths(&cloud.positions, &sensor, progress)?,
         None => None,
     };
-    let is_noisy = depth_noise.is_some_and(|noise| !is_auto || MIN_NOISE <= noise);
-    let depth_noise = depth_noise.filter(|_| is_noisy);
-    if !is_noisy {
-        cloud.positions.clone_from(&measured);
+    // The points before the first move, with their noise.
+    let mut measured = None;
+    if let Some(moved) = of_image.filter(|moved| !is_auto || MIN_NOISE <= moved.noise) {
+        let before = std::mem::replace(&mut cloud.positions, moved.positions);
+        measured = Some((before, moved.noise));
     }
-    let found = denoise_surfaces(cloud, is_auto, progress)?;
-    let (noise, normals) = match (depth_noise, found) {
-        (None, None) => return Ok(None),
-        (Some(noise), None) => (noise, vec![Vec3::ZERO; measured.len()]),
-        (depth_noise, Some((noise, normals))) => (depth_noise.unwrap_or(noise), normals),
-    };
+    let mut normals = Vec::new();
+    if let Some((moved, normals_of_surfaces)) = denoise_surfaces(cloud, is_auto, progress)? {
+        let before = std::mem::replace(&mut cloud.positions, moved.positions);
+        measured.get_or_insert((before, moved.noise));
+        normals = normals_of_surfaces;
+    }
+    let Some((measured, noise)) = measured else { return Ok(None) };
+    normals.resize(measured.len(), Vec3::ZERO);
     let moves = measured.iter().zip(&cloud.positions);
     let sum: f64 = moves.clone().map(|(from, to)| f64::from(from.distance(*to))).sum();
     let n_moved = moves.filter(|(from, to)| from != to).count();
@@ -128,13 +130,12 @@ pub fn denoise(
     Ok(Some(Denoised { report: DenoiseReport { noise, n_moved, mean_distance }, normals }))
 }
 
-/// Moves points onto the surface of their neighbours. Returns the median noise in spacings with the normals of
-/// [`Denoised`], or none if the points stay.
+/// Returns the points moved onto the surface of their neighbours, and the normals of [`Denoised`], or none if the points stay.
 fn denoise_surfaces(
-    cloud: &mut PointCloud,
+    cloud: &PointCloud,
     is_auto: bool,
     progress: &dyn Progress,
-) -> Result<Option<(f32, Vec<Vec3>)>> {
+) -> Result<Option<(MovedPoints, Vec<Vec3>)>> {
     let positions = &cloud.positions;
     let tree = KdTree::new(positions, progress)?;
     let order = tree.order();
@@ -169,8 +170,8 @@ fn denoise_surfaces(
         moved_points[*point as usize] = position;
         normals[*point as usize] = normal;
     }
-    cloud.positions = moved_points;
-    Ok(Some((noise.median(), normals)))
+    let moved = MovedPoints { positions: moved_points, noise: noise.median() };
+    Ok(Some((moved, normals)))
 }
 
 /// Returns the means of groups of points that follow each other in `order`.
@@ -465,6 +466,29 @@ mod tests {
             let found = denoise(&mut moved, Denoise::On, &NoProgress).unwrap().unwrap();
             let report = found.report;
             assert_eq!((report.n_moved, &moved), (0, &cloud));
+        }
+    }
+
+    #[test]
+    fn a_depth_image_with_fine_steps_moves_only_if_asked() {
+        let image = |n_steps: f32| {
+            let point = |pixel: usize| {
+                let [x, y] = [pixel % 200, pixel / 200].map(|at| at as f32 / 200.0 - 0.5);
+                let disparity = (n_steps * (0.3 + 0.1 * x - 0.13 * y)).round();
+                n_steps / disparity * Vec3::new(x, y, 1.0)
+            };
+            PointCloud::from_positions((0..40_000).map(point).collect())
+        };
+        for (n_steps, choice, is_moved) in [
+            (10_000.0, Denoise::Auto, false),
+            (10_000.0, Denoise::On, true),
+            (300.0, Denoise::Auto, true),
+        ] {
+            let (measured, mut cloud) = (image(n_steps), image(n_steps));
+            let found = denoise(&mut cloud, choice, &NoProgress).unwrap();
+            assert_eq!((found.is_some(), cloud != measured), (is_moved, is_moved), "{n_steps}");
+            let n_moved = measured.positions.iter().zip(&cloud.positions).filter(|(a, b)| a != b);
+            assert_eq!(found.map_or(0, |found| found.report.n_moved), n_moved.count());
         }
     }
 
