@@ -109,4 +109,13 @@ mod tests {
         };
         assert!(n_of_surface(hand(filled)) < 40);
     }
+
+    #[test]
+    fn a_stray_point_beyond_a_finger_stays_a_ball() {
+        let mut points = hand(|_, point| point);
+        points.push(Vec3::new(0.0, 0.0, 50.0));
+        let (cloud, structures) = prepared(points);
+        let last = cloud.positions().iter().position(|point| 40.0 < point.z).unwrap();
+        assert_eq!(structures[last], Structure::Scatter);
+    }
 }
