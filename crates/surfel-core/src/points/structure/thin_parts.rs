@@ -75,6 +75,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::points::test_clouds::prepared;
+    use crate::progress::NoProgress;
     use std::f32::consts::TAU;
 
     /// Returns a ball of radius 10 with a spacing of about 1, and a finger with eight points around.
@@ -112,10 +113,14 @@ mod tests {
 
     #[test]
     fn a_stray_point_beyond_a_finger_stays_a_ball() {
-        let mut points = hand(|_, point| point);
+        let mut points = hand(|_, point| point).split_off(1200);
         points.push(Vec3::new(0.0, 0.0, 50.0));
-        let (cloud, structures) = prepared(points);
-        let last = cloud.positions().iter().position(|point| 40.0 < point.z).unwrap();
-        assert_eq!(structures[last], Structure::Scatter);
+        let tree = KdTree::new(&points, &NoProgress).unwrap();
+        let ball = PointShape { structure: Structure::Scatter, normal: Vec3::Z, radius: 1.0 };
+        let mut shapes = vec![ball; points.len()];
+        join_thin_parts(&tree, &vec![3.0; points.len()], &mut shapes, &NoProgress).unwrap();
+        let (stray, finger) = shapes.split_last().unwrap();
+        assert_eq!(stray.structure, Structure::Scatter);
+        assert!(finger.iter().all(|shape| shape.structure == Structure::Surface));
     }
 }
