@@ -7,7 +7,7 @@
 use super::depth_image::{MovedPoints, smooth_depths};
 use super::depth_sensor::DepthSensor;
 use super::flat_faces::{FlatFaces, SupportPoints};
-use super::noise::Noise;
+use super::noise::{MIN_NOISE, Noise};
 use super::noise_at_point::{GROUP_SIZE, LocalFit};
 use super::plants::{NoisyPoints, Plants};
 use crate::error::Result;
@@ -21,8 +21,6 @@ use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
 
-/// Least noise, in spacings, from which a cloud is denoised unasked.
-const MIN_NOISE: f32 = 0.15;
 /// Number of neighbours per spacing of noise: the fitted normals err by some two degrees.
 const NEIGHBORS_PER_NOISE: f32 = 80.0;
 /// Numbers of neighbours that take part: the least and the most.
@@ -44,7 +42,7 @@ const MAX_HEIGHT: f32 = 6.0;
 /// The choice whether points are moved onto their surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Denoise {
-    /// Noisy surfaces without radii, and points on straight lines, are denoised.
+    /// Clouds without radii are denoised where surfaces are noisy, and so are points on straight lines.
     #[default]
     Auto,
     /// Points are moved however little noise there is. Plants, points that fill space and animated clouds stay, and of clouds with
@@ -57,7 +55,7 @@ pub enum Denoise {
 /// Effect of denoising.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DenoiseReport {
-    /// Median noise over the regions of surfaces: the standard deviation of points from their surface, in spacings. In a depth
+    /// Median noise over the regions of surfaces that were denoised: the standard deviation of points from their surface, in spacings. In a depth
     /// image that of the depths, in pixels.
     pub noise: f32,
     /// Number of points that were moved.
@@ -141,8 +139,9 @@ fn denoise_surfaces(
     let order = tree.order();
     let means = means_of_groups(positions, &order);
     let groups = KdTree::new(&means, progress)?;
-    let noise = Noise::new(&tree, &groups, &order, progress)?;
-    if is_auto && (noise.median() < MIN_NOISE || !noise.has_surfaces()) {
+    let min_median = if is_auto { MIN_NOISE } else { 0.0 };
+    let noise = Noise::new(&tree, &groups, &order, min_median, progress)?;
+    if is_auto && !noise.has_surfaces() {
         return Ok(None);
     }
     drop(tree);
@@ -454,6 +453,36 @@ mod tests {
             assert_eq!(denoise(&mut moved, Denoise::Auto, &NoProgress).unwrap(), None);
             assert_eq!(moved, cloud);
         }
+    }
+
+    #[test]
+    fn noisy_parts_of_a_smooth_cloud_move_and_the_rest_stays() {
+        let mut random = Random::new(4, 0);
+        let mut between = |low: f32, high: f32| low + (high - low) * random.next_f32();
+        // Smooth ground, a noisy wall upon it, a wire above, and a tree.
+        let ground = noisy_plane(0.05).positions;
+        let mut wall = noisy_plane(0.4).positions;
+        wall.truncate(6000);
+        wall.iter_mut().for_each(|p| *p = Vec3::new(p.x, 20.0 + p.z, 5.0 + p.y));
+        let wire = (0..50).map(|i| Vec3::new(2.0 * i as f32, 60.0, 50.0));
+        let tree = (0..1000)
+            .map(|_| Vec3::new(between(60.0, 80.0), between(70.0, 90.0), between(10.0, 30.0)));
+        let all: Vec<Vec3> = ground.iter().chain(&wall).copied().chain(wire).chain(tree).collect();
+        let mut cloud = PointCloud::from_positions(all.clone());
+        let report = denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap().report;
+        assert!((0.3..0.5).contains(&report.noise), "{report:?}");
+        let has_moved = |i: &usize| all[*i] != cloud.positions[*i];
+        let count = |points: std::ops::Range<usize>| points.filter(has_moved).count();
+        let (n_ground, n_wall) = (ground.len(), wall.len());
+        assert!(10 * count(0..n_ground) < n_ground, "{}", count(0..n_ground));
+        let of_wall = n_ground..n_ground + n_wall;
+        assert!(4 * n_wall < 5 * count(of_wall.clone()), "{}", count(of_wall.clone()));
+        assert!(count(of_wall.end..all.len()) < 50, "{}", count(of_wall.end..all.len()));
+        let height = |points: &[Vec3]| {
+            let of_wall = &points[of_wall.clone()];
+            of_wall.iter().map(|p| (p.y - 20.0).abs()).sum::<f32>() / n_wall as f32
+        };
+        assert!(height(&cloud.positions) < 0.5 * height(&all));
     }
 
     #[test]

@@ -14,10 +14,17 @@ use crate::points::structure::solids::{
 use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 
 /// Maximum ratio of the length of a capsule on an axis to that before. Poles amid thin wires grow.
 const MAX_GROWTH: f32 = 16.0;
+
+/// Minimum number of a point's neighbours that are on lines, too: few are where sparse points lie on a line by chance.
+const MIN_NEIGHBORS_ON_LINES: usize = N_STRAIGHT_NEIGHBORS / 3;
+/// Minimum number of points of a neighbourhood on each of two lines.
+const MIN_ON_LINE: usize = 3;
+/// Number of directions across a line in which a gap is sought.
+const N_GAP_DIRECTIONS: usize = 8;
 
 /// Effect of moving points onto the axes of their lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +59,7 @@ pub struct LineAxis {
     half_length: f32,
 }
 
-/// Finds the axis of each point on a straight line, in the order of the points. `scanner` is the position of the scanner
+/// Finds the axis of each point on a straight line among others, in the order of the points. `scanner` is the position of the scanner
 /// relative to the origin of the cloud, unless the cloud has stations.
 ///
 /// # Errors
@@ -102,9 +109,11 @@ pub fn find_axes(
         let neighbors = tree.nearest(positions[*point], N_STRAIGHT_NEIGHBORS, Some(*point as u32));
         let radii = neighbors.iter().filter_map(radius_at);
         let (sum, n) = radii.fold((line.radius, 1), |(sum, n), radius| (sum + radius, n + 1));
-        Ok(line.axis(*point, positions[*point], sum / f64::from(n), shapes[*point].radius))
+        let radius = sum / n as f64;
+        let is_line = MIN_NEIGHBORS_ON_LINES < n;
+        Ok(is_line.then(|| line.axis(*point, positions[*point], radius, shapes[*point].radius)))
     };
-    lines.par_iter().map(axis).collect()
+    lines.par_iter().map(axis).filter_map(Result::transpose).collect()
 }
 
 /// Moves points onto their axes, and gives their capsules the directions and lengths of these. Returns none if there are no
@@ -154,6 +163,13 @@ impl StraightLine {
         let reach = kth_distance(&neighbors, 2);
         let direction = fit.direction.as_dvec3();
         let members = || neighbors.iter().map(|other| other.index as usize).chain([point]);
+        let offset = |member: usize| {
+            let offset = (positions[member] - positions[point]).as_dvec3() - fit.mean;
+            offset.reject_from(direction)
+        };
+        if are_two_lines(&members().map(offset).collect::<Vec<DVec3>>(), direction) {
+            return None;
+        }
         let across = |vector: DVec3| vector.reject_from(direction).normalize_or_zero();
         let toward: Option<Vec<DVec3>> =
             members().map(|member| toward_scanner(member).map(across)).collect();
@@ -189,6 +205,22 @@ impl StraightLine {
         let position = (position.as_dvec3() + on_axis).as_vec3();
         LineAxis { point, position, direction: self.fit.direction, half_length }
     }
+}
+
+/// True if points, given by their offsets from a line along `direction`, lie on two lines side by side: across a gap that is
+/// wider than half of their extent.
+fn are_two_lines(offsets: &[DVec3], direction: DVec3) -> bool {
+    let (u, v) = direction.any_orthonormal_pair();
+    let has_gap = |step: usize| {
+        let (sin, cos) = (PI * step as f64 / N_GAP_DIRECTIONS as f64).sin_cos();
+        let across = cos * u + sin * v;
+        let mut heights: Vec<f64> = offsets.iter().map(|offset| offset.dot(across)).collect();
+        heights.sort_unstable_by(f64::total_cmp);
+        let extent = heights[heights.len() - 1] - heights[0];
+        (MIN_ON_LINE..=heights.len().saturating_sub(MIN_ON_LINE))
+            .any(|i| extent < 2.0 * (heights[i] - heights[i - 1]))
+    };
+    (0..N_GAP_DIRECTIONS).any(has_gap)
 }
 
 /// Returns the offset of the mean of points from the axis of a cylinder, on whose sides toward scanners they lie at even steps
@@ -297,6 +329,16 @@ mod tests {
         let cloud = PointCloud::from_positions(points.collect());
         assert!(!axes(&cloud, None, 0.1).is_empty());
         assert_eq!(axes(&cloud, None, 0.01), []);
+    }
+
+    #[test]
+    fn two_wires_side_by_side_have_no_common_axis() {
+        let wires = |distance: f32| {
+            let point = |i: usize| Vec3::new(i as f32, (i % 3 % 2) as f32 * distance, 0.0);
+            PointCloud::from_positions((0..60).map(point).collect())
+        };
+        assert_eq!(axes(&wires(0.5), None, 1.0), []);
+        assert_eq!(axes(&wires(0.0), None, 1.0).len(), 60);
     }
 
     #[test]

@@ -42,6 +42,14 @@ const MIN_KNOWN_OF_SLAB: f32 = 0.5;
 const MAX_SLAB_VARIATION: f32 = 0.03;
 /// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised.
 const MIN_SURFACE_REGIONS: f32 = 0.1;
+/// Least median noise of a cloud that is noisy as a whole.
+pub const MIN_NOISE: f32 = 0.15;
+/// Least noise of a noisy part of another cloud. Smoother stone would lose its relief.
+const MIN_NOISE_OF_PART: f32 = 0.25;
+/// Minimum fraction of points at which the noise can be told in a region of such a part.
+const MIN_KNOWN_OF_PART: f32 = 0.6;
+/// Minimum fraction of regions in such parts.
+const MIN_NOISY_REGIONS: f32 = 0.05;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
 
@@ -51,16 +59,20 @@ pub struct Noise {
     centers: Vec<Vec3>,
     /// Their noise in spacings.
     noises: Vec<RegionNoise>,
-    /// Typical noise of the regions at most of whose points it can be told.
+    /// Typical noise of the regions at most of whose points it can be told, where they are noisy enough to be denoised.
     of_surfaces: Vec<f32>,
     has_surfaces: bool,
-    /// True for each point, in the order of the regions, that stays: its region fills space, or is no clear surface amid leaves.
+    /// Least noise of points that move: above zero if only parts of the cloud are noisy.
+    min_noise: f32,
+    /// True for each point, in the order of the regions, that stays: its region fills space, is no clear surface amid leaves,
+    /// or is not noisy, unlike other parts.
     is_at_rest: Vec<bool>,
 }
 
 impl Noise {
     /// Measures the noise. `order` lists the points so that those near each other follow each other, and `groups` are the
-    /// means of each [`GROUP_SIZE`] of them.
+    /// means of each [`GROUP_SIZE`] of them. Where the median noise is below `min_median`, only clearly noisy parts count as
+    /// surfaces.
     ///
     /// # Errors
     ///
@@ -69,6 +81,7 @@ impl Noise {
         tree: &KdTree,
         groups: &KdTree,
         order: &[u32],
+        min_median: f32,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let [least, most] = REGION_SIZES;
@@ -86,36 +99,49 @@ impl Noise {
         let n_filled = count(|region| region.n_filled);
         let is_amid_leaves = n_known <= MAX_KNOWN_WITH_LEAVES * n_samples
             && MIN_FILLED_WITH_LEAVES * (n_samples - n_known) <= n_filled;
+        let typical = |region: &Region| region.noise().map(|noise| noise.typical);
+        let min_known = if is_amid_leaves { MIN_KNOWN_OF_SURFACE } else { MIN_KNOWN };
+        let of_surfaces = regions.iter().filter(|region| region.is_known(min_known));
+        let is_in_parts =
+            median(of_surfaces.filter_map(typical)).is_some_and(|median| median < min_median);
+        let (min_known, min_noise) = match is_in_parts {
+            true => (MIN_KNOWN_OF_PART.max(min_known), MIN_NOISE_OF_PART),
+            false => (min_known, 0.0),
+        };
         let mut noise = Self {
             centers: Vec::new(),
             noises: Vec::new(),
             of_surfaces: Vec::new(),
             has_surfaces: false,
+            min_noise,
             is_at_rest: vec![false; order.len()],
         };
         for (region, is_at_rest) in regions.iter().zip(noise.is_at_rest.chunks_mut(size)) {
-            let is_surface =
-                region.is_known(if is_amid_leaves { MIN_KNOWN_OF_SURFACE } else { MIN_KNOWN });
+            let is_surface = region.is_known(min_known);
             let is_slab =
                 is_amid_leaves && region.lies_near_plane && region.is_known(MIN_KNOWN_OF_SLAB);
             if let Some(found) = region.noise().filter(|_| is_surface || is_slab) {
                 noise.centers.push(region.center);
                 noise.noises.push(found);
-                if is_surface {
+                if found.typical < min_noise {
+                    is_at_rest.fill(true);
+                } else if is_surface {
                     noise.of_surfaces.push(found.typical);
                 }
-            } else if is_amid_leaves || region.fills_space() {
+            } else if is_amid_leaves || is_in_parts || region.fills_space() {
                 is_at_rest.fill(true);
             }
         }
-        noise.has_surfaces = match is_amid_leaves {
-            true => MIN_SURFACE_REGIONS * regions.len() as f32 <= noise.of_surfaces.len() as f32,
-            false => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
+        let n_surfaces = noise.of_surfaces.len() as f32;
+        noise.has_surfaces = match (is_in_parts, is_amid_leaves) {
+            (true, _) => MIN_NOISY_REGIONS * regions.len() as f32 <= n_surfaces,
+            (_, true) => MIN_SURFACE_REGIONS * regions.len() as f32 <= n_surfaces,
+            _ => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
         };
         Ok(noise)
     }
 
-    /// Returns the median noise over the regions of surfaces.
+    /// Returns the median noise over the regions of surfaces that are noisy enough to be denoised.
     pub fn median(&self) -> f32 {
         self.quantile(0.5)
     }
@@ -128,7 +154,7 @@ impl Noise {
             .unwrap_or(0.0)
     }
 
-    /// True if the cloud has surfaces, not only leaves.
+    /// True if the cloud has noisy surfaces, not only leaves.
     pub fn has_surfaces(&self) -> bool {
         self.has_surfaces
     }
@@ -164,11 +190,16 @@ impl Noise {
             }
             let noise = self.at(&centers, points.positions()[point]);
             let own = fits[point];
-            if SPARSE_RATIO * noise.reach < own.reach
-                && let NoiseAtPoint::Known(found) = NoiseAtPoint::new(points, groups, point as u32)
-                && (found < MIN_OTHER || own.is_noisier_at(points, point, found))
-            {
-                return Ok(Some(found));
+            if SPARSE_RATIO * noise.reach < own.reach {
+                if let NoiseAtPoint::Known(found) = NoiseAtPoint::new(points, groups, point as u32)
+                    && self.min_noise <= found
+                    && (found < MIN_OTHER || own.is_noisier_at(points, point, found))
+                {
+                    return Ok(Some(found));
+                }
+                if 0.0 < self.min_noise {
+                    return Ok(None);
+                }
             }
             let is_other = noise.is_mixed() && own.is_noisier_at(points, point, noise.other);
             Ok(Some(if is_other { noise.other } else { noise.typical }))
@@ -285,7 +316,7 @@ mod tests {
     fn noisy_fraction(points: &[Vec3], is_asked: impl Fn(&Vec3) -> bool) -> f64 {
         let tree = KdTree::new(points, &NoProgress).unwrap();
         let order = tree.order();
-        let noise = Noise::new(&tree, &tree, &order, &NoProgress).unwrap();
+        let noise = Noise::new(&tree, &tree, &order, 0.0, &NoProgress).unwrap();
         let sorted: Vec<Vec3> = order.iter().map(|point| points[*point as usize]).collect();
         let tree = KdTree::new(&sorted, &NoProgress).unwrap();
         let fits = LocalFit::of_points(&tree, &NoProgress).unwrap();
