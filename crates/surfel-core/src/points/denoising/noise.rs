@@ -34,22 +34,18 @@ const MAX_KNOWN_WITH_LEAVES: f32 = 0.8;
 const MIN_FILLED_WITH_LEAVES: f32 = 0.15;
 /// Minimum fraction of points at which the noise can be told in a cloud without leaves that is denoised.
 const MIN_KNOWN_WITHOUT_LEAVES: f32 = 0.7;
-/// Minimum fraction of points at which the noise can be told in a region of a surface amid leaves.
+/// Minimum fraction of points at which the noise can be told in a region of a surface amid leaves, or of a noisy part.
 const MIN_KNOWN_OF_SURFACE: f32 = 0.8;
 /// Minimum fraction of points at which the noise can be told in a region near a plane amid leaves, as of the ground.
 const MIN_KNOWN_OF_SLAB: f32 = 0.5;
 /// Maximum surface variation of points that lie near a plane.
 const MAX_SLAB_VARIATION: f32 = 0.03;
-/// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised.
+/// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised, and of noisy parts in a smooth one.
 const MIN_SURFACE_REGIONS: f32 = 0.1;
 /// Least median noise of a cloud that is noisy as a whole.
 pub const MIN_NOISE: f32 = 0.15;
 /// Least noise of a noisy part of another cloud. Smoother stone would lose its relief.
 const MIN_NOISE_OF_PART: f32 = 0.25;
-/// Minimum fraction of points at which the noise can be told in a region of such a part.
-const MIN_KNOWN_OF_PART: f32 = 0.6;
-/// Minimum fraction of regions in such parts.
-const MIN_NOISY_REGIONS: f32 = 0.05;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
 
@@ -102,10 +98,12 @@ impl Noise {
         let typical = |region: &Region| region.noise().map(|noise| noise.typical);
         let min_known = if is_amid_leaves { MIN_KNOWN_OF_SURFACE } else { MIN_KNOWN };
         let of_surfaces = regions.iter().filter(|region| region.is_known(min_known));
-        let is_in_parts =
+        let is_smooth =
             median(of_surfaces.filter_map(typical)).is_some_and(|median| median < min_median);
+        // Noisy parts amid leaves are plants.
+        let is_in_parts = is_smooth && !is_amid_leaves;
         let (min_known, min_noise) = match is_in_parts {
-            true => (MIN_KNOWN_OF_PART.max(min_known), MIN_NOISE_OF_PART),
+            true => (MIN_KNOWN_OF_SURFACE, MIN_NOISE_OF_PART),
             false => (min_known, 0.0),
         };
         let mut noise = Self {
@@ -133,11 +131,13 @@ impl Noise {
             }
         }
         let n_surfaces = noise.of_surfaces.len() as f32;
-        noise.has_surfaces = match (is_in_parts, is_amid_leaves) {
-            (true, _) => MIN_NOISY_REGIONS * regions.len() as f32 <= n_surfaces,
-            (_, true) => MIN_SURFACE_REGIONS * regions.len() as f32 <= n_surfaces,
-            _ => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
+        noise.has_surfaces = match is_amid_leaves || is_in_parts {
+            true => MIN_SURFACE_REGIONS * regions.len() as f32 <= n_surfaces,
+            false => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
         };
+        if is_smooth && !is_in_parts {
+            noise.has_surfaces = false;
+        }
         Ok(noise)
     }
 
