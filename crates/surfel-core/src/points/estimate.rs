@@ -14,11 +14,11 @@ use super::scan::scan_rings::ScanRings;
 use super::structure::below_roofs::narrow_to_roofs;
 use super::structure::find_structures::{Evidence, all_scattered, find_structures};
 use super::structure::neighborhood_stats::Typical;
-use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure::point_shape::{PointShape, StructureChoice, StructureReport};
 use super::structure::sparse_walls::find_sparse_walls;
 use super::structure::structure_votes::{Voters, voters_among};
 use super::structure::thin_parts::join_thin_parts;
-use super::structure::vegetation::{self, count_rough, is_vegetated, land_normal};
+use super::structure::vegetation::{count_rough, is_vegetated, land_normal};
 use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
@@ -172,12 +172,10 @@ pub fn find_shapes<'a>(
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });
-            let stated_normals = cloud.normals.as_deref();
-            let evidence = Evidence { rings, is_elevation_grid, stated_normals };
-            let mut shapes = find_structures(&tree, fits, radii, voters, &evidence, progress)?;
-            let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
-            let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
-            has_leaves = vegetation::has_leaves(cloud, &structures, &shown, || rings.is_some());
+            let evidence = Evidence { cloud, rings, is_elevation_grid };
+            let mut shapes;
+            (shapes, has_leaves) =
+                find_structures(&tree, fits, radii, voters, &evidence, progress)?;
             if !has_leaves {
                 join_thin_parts(&tree, radii, &mut shapes, progress)?;
             }

@@ -476,7 +476,7 @@ mod tests {
         let (n_ground, n_wall) = (ground.len(), wall.len());
         assert!(10 * count(0..n_ground) < n_ground, "{}", count(0..n_ground));
         let of_wall = n_ground..n_ground + n_wall;
-        assert!(4 * n_wall < 5 * count(of_wall.clone()), "{}", count(of_wall.clone()));
+        assert!(2 * n_wall < 3 * count(of_wall.clone()), "{}", count(of_wall.clone()));
         assert!(count(of_wall.end..all.len()) < 50, "{}", count(of_wall.end..all.len()));
         let height = |points: &[Vec3]| {
             let of_wall = &points[of_wall.clone()];

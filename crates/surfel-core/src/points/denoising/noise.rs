@@ -44,7 +44,7 @@ const MAX_SLAB_VARIATION: f32 = 0.03;
 const MIN_SURFACE_REGIONS: f32 = 0.1;
 /// Least median noise of a cloud that is noisy as a whole.
 pub const MIN_NOISE: f32 = 0.15;
-/// Least noise of a noisy part of another cloud. Smoother stone would lose its relief.
+/// Least noise of a noisy part of another cloud, as a wall. Smoother stone would lose its relief.
 const MIN_NOISE_OF_PART: f32 = 0.25;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
@@ -115,7 +115,7 @@ impl Noise {
             is_at_rest: vec![false; order.len()],
         };
         for (region, is_at_rest) in regions.iter().zip(noise.is_at_rest.chunks_mut(size)) {
-            let is_surface = region.is_known(min_known);
+            let is_surface = region.is_known(min_known) && (!is_in_parts || region.lies_near_plane);
             let is_slab =
                 is_amid_leaves && region.lies_near_plane && region.is_known(MIN_KNOWN_OF_SLAB);
             if let Some(found) = region.noise().filter(|_| is_surface || is_slab) {

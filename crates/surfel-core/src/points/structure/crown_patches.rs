@@ -2,6 +2,8 @@
 
 use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure};
+use super::solids::apply_structure;
+use super::vegetation::land_normal;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::neighbors::{KdTree, Neighbor};
@@ -28,29 +30,33 @@ const MIN_SCATTERED: f32 = 0.12;
 /// Minimum fraction of them on each side of the patch.
 const MIN_ON_EACH_SIDE: f32 = 0.03;
 
-/// Makes scattered points of the patches of surface in crowns, in clouds with much vegetation: steep patches of at most as
-/// many points as a neighbourhood has, and small ones that lie amid scattered points. Level ones have more of these below
-/// than above. `up` is the normal of the land.
+/// Makes scattered points of the patches of surface in crowns: small ones that lie amid scattered points. Level ones have more
+/// of these below than above. `wooded_land` is the normal of the land in a cloud with much vegetation, where steep patches of at most
+/// as many points as a neighbourhood has are scattered, too. `radii` are those of points of surfaces.
 ///
 /// # Errors
 ///
 /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
 pub fn scatter_crown_patches(
     tree: &KdTree,
-    shapes: &[PointShape],
-    up: Vec3,
-    structures: &mut [Structure],
+    radii: &[f32],
+    wooded_land: Option<Vec3>,
+    shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
-    let patches = small_patches(tree, shapes, structures, progress)?;
+    let up = wooded_land.unwrap_or_else(|| land_normal(tree.positions(), shapes));
+    let patches = small_patches(tree, shapes, progress)?;
     let in_crown = |patch: &Vec<u32>| {
         progress.check()?;
-        Ok(is_in_crown(tree, shapes, structures, up, patch))
+        let is_lone = wooded_land.is_some() && patch.len() <= MAX_LONE;
+        let is_steep = is_steep(shapes, up, patch);
+        Ok(is_lone && is_steep || is_amid_scattered(tree, shapes, up, is_steep, patch))
     };
     let in_crown: Vec<bool> = patches.par_iter().map(in_crown).collect::<Result<_>>()?;
     let patches = patches.into_iter().zip(in_crown).filter(|(_, in_crown)| *in_crown);
     for point in patches.flat_map(|(patch, _)| patch) {
-        structures[point as usize] = Structure::Scatter;
+        let point = point as usize;
+        apply_structure(tree, point, radii[point], Structure::Scatter, &mut shapes[point]);
     }
     Ok(())
 }
@@ -59,10 +65,9 @@ pub fn scatter_crown_patches(
 fn small_patches(
     tree: &KdTree,
     shapes: &[PointShape],
-    structures: &[Structure],
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<u32>>> {
-    let is_surface = |point: usize| structures[point] == Structure::Surface;
+    let is_surface = |point: usize| shapes[point].structure == Structure::Surface;
     let is_linked = |point: usize, other: usize| {
         MIN_LINK_COSINE < shapes[point].normal.dot(shapes[other].normal).abs()
     };
@@ -71,22 +76,23 @@ fn small_patches(
     Ok(patches)
 }
 
-/// Returns true if a small patch lies in a crown.
-fn is_in_crown(
-    tree: &KdTree,
-    shapes: &[PointShape],
-    structures: &[Structure],
-    up: Vec3,
-    patch: &[u32],
-) -> bool {
+/// True if most of the points of a patch are steep.
+fn is_steep(shapes: &[PointShape], up: Vec3, patch: &[u32]) -> bool {
     let n_steep = patch
         .iter()
         .filter(|point| shapes[**point as usize].normal.dot(up).abs() < MAX_STEEP_COSINE)
         .count();
-    let is_steep = patch.len() < 2 * n_steep;
-    if patch.len() <= MAX_LONE && is_steep {
-        return true;
-    }
+    patch.len() < 2 * n_steep
+}
+
+/// True if a patch has scattered points on both sides, and below rather than above if it is not steep.
+fn is_amid_scattered(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    up: Vec3,
+    is_steep: bool,
+    patch: &[u32],
+) -> bool {
     let (mut n_above, mut n_below) = (0, 0);
     for point in patch {
         let position = tree.positions()[*point as usize];
@@ -97,7 +103,7 @@ fn is_in_crown(
         let height =
             |neighbor: &Neighbor| upward.dot(tree.positions()[neighbor.index as usize] - position);
         let is_scattered =
-            |neighbor: &&Neighbor| structures[neighbor.index as usize] == Structure::Scatter;
+            |neighbor: &&Neighbor| shapes[neighbor.index as usize].structure == Structure::Scatter;
         for height in neighbors.iter().filter(is_scattered).map(height) {
             n_above += usize::from(min_height < height);
             n_below += usize::from(height < -min_height);
@@ -161,17 +167,18 @@ mod tests {
             ends.push(wood.positions.len());
         }
         let tree = KdTree::new(&wood.positions, &NoProgress).unwrap();
-        let mut structures: Vec<Structure> =
-            wood.shapes.iter().map(|shape| shape.structure).collect();
-        scatter_crown_patches(&tree, &wood.shapes, Vec3::Z, &mut structures, &NoProgress).unwrap();
-        let scattered = |of: usize| {
-            let part = &structures[of.checked_sub(1).map_or(0, |before| ends[before])..ends[of]];
-            let n_scattered = part.iter().filter(|one| **one == Structure::Scatter).count();
-            n_scattered as f32 / part.len() as f32
+        let scattered = |wooded_land: Option<Vec3>| {
+            let (radii, mut shapes) = (vec![1.0; wood.shapes.len()], wood.shapes.clone());
+            scatter_crown_patches(&tree, &radii, wooded_land, &mut shapes, &NoProgress).unwrap();
+            let fraction = |of: usize| {
+                let part = &shapes[of.checked_sub(1).map_or(0, |before| ends[before])..ends[of]];
+                let is_scattered = |shape: &&PointShape| shape.structure == Structure::Scatter;
+                part.iter().filter(is_scattered).count() as f32 / part.len() as f32
+            };
+            [0, 1, 2, 3, 4, 5, 6, 7].map(fraction)
         };
-        assert_eq!(
-            [0, 1, 2, 3, 4, 5, 6, 7].map(scattered),
-            [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]
-        );
+        assert_eq!(scattered(Some(Vec3::Z)), [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+        // On land with few plants a small steep patch may be of a wall.
+        assert_eq!(scattered(None), [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     }
 }

@@ -20,11 +20,12 @@ use super::solids::{
 use super::stated_normals::join_by_stated_normals;
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
-use super::vegetation::{count_rough, is_vegetated, land_normal};
+use super::vegetation::{count_rough, has_leaves, is_vegetated, land_normal};
 use super::wall_faces::join_faces;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3};
+use crate::points::PointCloud;
 use crate::points::neighbors::{KdTree, Neighbor, Neighborhood};
 use crate::points::normals::planes::{PlaneFit, fit_plane};
 use crate::points::scan::scan_rings::Ring;
@@ -43,19 +44,18 @@ const N_WIDEST_NEIGHBORS: usize = 144;
 /// Maximum surface variation of so many neighbours of a surface. Crowns have more.
 const MAX_WIDEST_VARIATION: f32 = 0.03;
 
-/// The knowledge about a cloud beside its positions.
-#[derive(Default)]
+/// The knowledge about a cloud.
 pub struct Evidence<'a> {
+    /// The cloud with its normals, zero where it has none, and its classes.
+    pub cloud: &'a PointCloud,
     /// Rings of a spinning scanner with its place, relative to the origin of the cloud.
     pub rings: Option<(&'a [Ring], Vec3)>,
     /// True if the cloud had one point for each cell of a horizontal grid. All its points are of a surface.
     pub is_elevation_grid: bool,
-    /// Normals of the file; zero where it has none.
-    pub stated_normals: Option<&'a [Vec3]>,
 }
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
-/// of them. `voters` are those of each point; if it is empty, they are searched where they are needed.
+/// of them, and whether scattered points are leaves. `voters` are those of each point; if it is empty, they are searched where they are needed.
 ///
 /// # Errors
 ///
@@ -67,8 +67,8 @@ pub fn find_structures(
     voters: Vec<Voters>,
     evidence: &Evidence,
     progress: &dyn Progress,
-) -> Result<Vec<PointShape>> {
-    let Evidence { rings, is_elevation_grid, stated_normals } = *evidence;
+) -> Result<(Vec<PointShape>, bool)> {
+    let Evidence { cloud, rings, is_elevation_grid } = *evidence;
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
     let typical = Typical::of(fits, radii);
@@ -106,11 +106,8 @@ pub fn find_structures(
     } else {
         let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
         above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
-        if let Some(normals) = stated_normals {
+        if let Some(normals) = &cloud.normals {
             join_by_stated_normals(tree, normals, &mut structures, &mut shapes, progress)?;
-        }
-        if let Some(land) = land {
-            scatter_crown_patches(tree, &shapes, land, &mut structures, progress)?;
         }
         structures
     };
@@ -122,6 +119,11 @@ pub fn find_structures(
         Ok(())
     };
     shapes.par_iter_mut().zip(&structures).enumerate().try_for_each(finish)?;
+    let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
+    let has_leaves = has_leaves(cloud, &structures, &shown, || rings.is_some());
+    if has_leaves {
+        scatter_crown_patches(tree, radii, land, &mut shapes, progress)?;
+    }
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     if is_land && !is_elevation_grid {
@@ -136,7 +138,7 @@ pub fn find_structures(
         None => clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size),
     }
     limit_stray_points(tree, &mut shapes, progress)?;
-    Ok(shapes)
+    Ok((shapes, has_leaves))
 }
 
 /// Makes each point stand for itself.
