@@ -7,7 +7,7 @@
 use super::depth_image::{MovedPoints, smooth_depths};
 use super::depth_sensor::DepthSensor;
 use super::flat_faces::{FlatFaces, SupportPoints};
-use super::noise::{MIN_NOISE, Noise};
+use super::noise::Noise;
 use super::noise_at_point::{GROUP_SIZE, LocalFit};
 use super::plants::{NoisyPoints, Plants};
 use crate::error::Result;
@@ -21,6 +21,8 @@ use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
 
+/// Least noise of a depth image, in pixels, that is denoised unasked.
+const MIN_PIXEL_NOISE: f32 = 0.15;
 /// Number of neighbours per spacing of noise: the fitted normals err by some two degrees.
 const NEIGHBORS_PER_NOISE: f32 = 80.0;
 /// Numbers of neighbours that take part: the least and the most.
@@ -55,8 +57,8 @@ pub enum Denoise {
 /// Effect of denoising.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DenoiseReport {
-    /// Median noise over the regions of surfaces that were denoised: the standard deviation of points from their surface, in spacings. In a depth
-    /// image that of the depths, in pixels.
+    /// Median noise over the regions of surfaces that were denoised: the standard deviation of points from their surface, in
+    /// spacings. In a depth image that of the depths, in pixels.
     pub noise: f32,
     /// Number of points that were moved.
     pub n_moved: usize,
@@ -109,7 +111,7 @@ pub fn denoise(
     };
     // The points before the first move, with their noise.
     let mut measured = None;
-    if let Some(moved) = of_image.filter(|moved| !is_auto || MIN_NOISE <= moved.noise) {
+    if let Some(moved) = of_image.filter(|moved| !is_auto || MIN_PIXEL_NOISE <= moved.noise) {
         let before = std::mem::replace(&mut cloud.positions, moved.positions);
         measured = Some((before, moved.noise));
     }
@@ -139,9 +141,8 @@ fn denoise_surfaces(
     let order = tree.order();
     let means = means_of_groups(positions, &order);
     let groups = KdTree::new(&means, progress)?;
-    let min_median = if is_auto { MIN_NOISE } else { 0.0 };
-    let noise = Noise::new(&tree, &groups, &order, min_median, progress)?;
-    if is_auto && !noise.has_surfaces() {
+    let noise = Noise::new(&tree, &groups, &order, is_auto, progress)?;
+    if is_auto && !noise.is_noisy() {
         return Ok(None);
     }
     drop(tree);
@@ -150,7 +151,7 @@ fn denoise_surfaces(
     let tree = KdTree::new(&sorted, progress)?;
     let fits = LocalFit::of_points(&tree, progress)?;
     let noises = noise.at_points(&tree, &groups, &fits, progress)?;
-    let ground_noise = noise.quantile(0.25);
+    let ground_noise = noise.of_ground();
     let noisy = NoisyPoints { tree: &tree, groups: &groups, fits: &fits, noises: &noises };
     let plants = Plants::find(noisy, ground_noise, cloud, progress)?;
     let count = |(point, noise): (usize, &Option<f32>)| {
@@ -473,16 +474,32 @@ mod tests {
         assert!((0.3..0.5).contains(&report.noise), "{report:?}");
         let has_moved = |i: &usize| all[*i] != cloud.positions[*i];
         let count = |points: std::ops::Range<usize>| points.filter(has_moved).count();
-        let (n_ground, n_wall) = (ground.len(), wall.len());
+        let (n_ground, n_wall, n_wire) = (ground.len(), wall.len(), 50);
         assert!(10 * count(0..n_ground) < n_ground, "{}", count(0..n_ground));
         let of_wall = n_ground..n_ground + n_wall;
         assert!(2 * n_wall < 3 * count(of_wall.clone()), "{}", count(of_wall.clone()));
-        assert!(count(of_wall.end..all.len()) < 50, "{}", count(of_wall.end..all.len()));
+        assert_eq!(count(of_wall.end..of_wall.end + n_wire), 0);
+        let n_of_tree = count(of_wall.end + n_wire..all.len());
+        assert!(n_of_tree < 20, "{n_of_tree}");
         let height = |points: &[Vec3]| {
             let of_wall = &points[of_wall.clone()];
             of_wall.iter().map(|p| (p.y - 20.0).abs()).sum::<f32>() / n_wall as f32
         };
         assert!(height(&cloud.positions) < 0.5 * height(&all));
+    }
+
+    #[test]
+    fn noisy_parts_amid_leaves_stay() {
+        let mut random = Random::new(5, 0);
+        let mut between = |low: f32, high: f32| low + (high - low) * random.next_f32();
+        let ground = noisy_plane(0.05).positions;
+        let wall = noisy_plane(0.4).positions.into_iter().take(6000);
+        let wall = wall.map(|p| Vec3::new(p.x, 20.0 + p.z, 5.0 + p.y));
+        let crowns = (0..8000)
+            .map(|_| Vec3::new(between(0.0, 100.0), between(40.0, 100.0), between(10.0, 30.0)));
+        let all: Vec<Vec3> = ground.into_iter().chain(wall).chain(crowns).collect();
+        let mut cloud = PointCloud::from_positions(all);
+        assert_eq!(denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap(), None);
     }
 
     #[test]
@@ -495,6 +512,7 @@ mod tests {
             let found = denoise(&mut moved, Denoise::On, &NoProgress).unwrap().unwrap();
             let report = found.report;
             assert_eq!((report.n_moved, &moved), (0, &cloud));
+            assert_eq!(denoise(&mut moved, Denoise::Auto, &NoProgress).unwrap(), None);
         }
     }
 

@@ -18,11 +18,12 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 /// Maximum ratio of the length of a capsule on an axis to that before. Poles amid thin wires grow.
 const MAX_GROWTH: f32 = 16.0;
-
-/// Minimum number of a point's neighbours that are on lines, too: few are where sparse points lie on a line by chance.
+/// Minimum number of a point's neighbours that have a straight line, too. Sparse points that lie on a line by chance have fewer.
 const MIN_NEIGHBORS_ON_LINES: usize = N_STRAIGHT_NEIGHBORS / 3;
 /// Minimum number of points of a neighbourhood on each of two lines.
 const MIN_ON_LINE: usize = 3;
+/// Minimum ratio of the gap between two lines to the extent of both.
+const MIN_GAP: f64 = 0.7;
 /// Number of directions across a line in which a gap is sought.
 const N_GAP_DIRECTIONS: usize = 8;
 
@@ -167,7 +168,8 @@ impl StraightLine {
             let offset = (positions[member] - positions[point]).as_dvec3() - fit.mean;
             offset.reject_from(direction)
         };
-        if are_two_lines(&members().map(offset).collect::<Vec<DVec3>>(), direction) {
+        let offsets: Vec<DVec3> = members().map(offset).collect();
+        if are_two_lines(&offsets, direction, f64::from(reach)) {
             return None;
         }
         let across = |vector: DVec3| vector.reject_from(direction).normalize_or_zero();
@@ -207,20 +209,19 @@ impl StraightLine {
     }
 }
 
-/// True if points, given by their offsets from a line along `direction`, lie on two lines side by side: across a gap that is
-/// wider than half of their extent.
-fn are_two_lines(offsets: &[DVec3], direction: DVec3) -> bool {
+/// True if points, given by their offsets from a line along `direction`, lie on two lines side by side: across a gap that is far
+/// wider than either, and than `reach`, the distance between points.
+fn are_two_lines(offsets: &[DVec3], direction: DVec3, reach: f64) -> bool {
     let (u, v) = direction.any_orthonormal_pair();
-    let has_gap = |step: usize| {
+    let mut heights = vec![0.0; offsets.len()];
+    (0..N_GAP_DIRECTIONS).any(|step| {
         let (sin, cos) = (PI * step as f64 / N_GAP_DIRECTIONS as f64).sin_cos();
         let across = cos * u + sin * v;
-        let mut heights: Vec<f64> = offsets.iter().map(|offset| offset.dot(across)).collect();
+        heights.iter_mut().zip(offsets).for_each(|(height, offset)| *height = offset.dot(across));
         heights.sort_unstable_by(f64::total_cmp);
-        let extent = heights[heights.len() - 1] - heights[0];
-        (MIN_ON_LINE..=heights.len().saturating_sub(MIN_ON_LINE))
-            .any(|i| extent < 2.0 * (heights[i] - heights[i - 1]))
-    };
-    (0..N_GAP_DIRECTIONS).any(has_gap)
+        let min_gap = reach.max(MIN_GAP * (heights[heights.len() - 1] - heights[0]));
+        (MIN_ON_LINE..=heights.len() - MIN_ON_LINE).any(|i| min_gap < heights[i] - heights[i - 1])
+    })
 }
 
 /// Returns the offset of the mean of points from the axis of a cylinder, on whose sides toward scanners they lie at even steps
@@ -333,12 +334,33 @@ mod tests {
 
     #[test]
     fn two_wires_side_by_side_have_no_common_axis() {
-        let wires = |distance: f32| {
+        let n_axes = |distance: f32| {
             let point = |i: usize| Vec3::new(i as f32, (i % 3 % 2) as f32 * distance, 0.0);
-            PointCloud::from_positions((0..60).map(point).collect())
+            axes(&PointCloud::from_positions((0..60).map(point).collect()), None, 1.0).len()
         };
-        assert_eq!(axes(&wires(0.5), None, 1.0), []);
-        assert_eq!(axes(&wires(0.0), None, 1.0).len(), 60);
+        // Coordinates are rounded in the second case.
+        assert_eq!([0.0, 0.3, 2.5].map(n_axes), [60, 60, 0]);
+    }
+
+    #[test]
+    fn a_wire_between_opposite_scanners_has_an_axis() {
+        let stations = [DVec3::new(2.0, -9.0, 0.0), DVec3::new(7.0, 9.0, 0.0)];
+        let cloud = wire(&stations, 0.1 * RADIUS);
+        assert_eq!(axes(&cloud, None, 0.1).len(), cloud.len());
+    }
+
+    #[test]
+    fn a_point_that_lies_on_a_line_alone_has_no_axis() {
+        let points = (0..60).map(|i| Vec3::X * i as f32).collect();
+        let cloud = PointCloud::from_positions(points);
+        let tree = KdTree::new(&cloud.positions, &NoProgress).unwrap();
+        let shape = |structure| PointShape { structure, normal: Vec3::Y, radius: 1.0 };
+        let mut shapes = vec![shape(Structure::Scatter); 60];
+        for (n_lines, n_axes) in [(1, 0), (60, 60)] {
+            shapes[60 - n_lines..].fill(shape(Structure::Line));
+            let found = find_axes(&cloud, &tree, &shapes, None, &NoProgress).unwrap();
+            assert_eq!(found.len(), n_axes);
+        }
     }
 
     #[test]

@@ -42,9 +42,10 @@ const MIN_KNOWN_OF_SLAB: f32 = 0.5;
 const MAX_SLAB_VARIATION: f32 = 0.03;
 /// Minimum fraction of regions of surfaces in a cloud with leaves that is denoised, and of noisy parts in a smooth one.
 const MIN_SURFACE_REGIONS: f32 = 0.1;
-/// Least median noise of a cloud that is noisy as a whole.
-pub const MIN_NOISE: f32 = 0.15;
-/// Least noise of a noisy part of another cloud, as a wall. Smoother stone would lose its relief.
+/// Least median noise, in spacings, of a cloud that is denoised as a whole.
+const MIN_NOISE: f32 = 0.15;
+/// Least noise, in spacings, of a flat part that is denoised in a cloud with less noise elsewhere. Smoother stone would lose its
+/// relief.
 const MIN_NOISE_OF_PART: f32 = 0.25;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
@@ -55,20 +56,20 @@ pub struct Noise {
     centers: Vec<Vec3>,
     /// Their noise in spacings.
     noises: Vec<RegionNoise>,
-    /// Typical noise of the regions at most of whose points it can be told, where they are noisy enough to be denoised.
+    /// Typical noise of the regions at most of whose points it can be told, and which are noisy enough to be denoised.
     of_surfaces: Vec<f32>,
-    has_surfaces: bool,
-    /// Least noise of points that move: above zero if only parts of the cloud are noisy.
+    /// True if these are enough for the cloud to be denoised unasked.
+    is_noisy: bool,
+    /// Least typical noise of a region whose points move: above zero if only flat parts of the cloud are noisy.
     min_noise: f32,
     /// True for each point, in the order of the regions, that stays: its region fills space, is no clear surface amid leaves,
-    /// or is not noisy, unlike other parts.
+    /// or is no noisy flat part where only such parts move.
     is_at_rest: Vec<bool>,
 }
 
 impl Noise {
     /// Measures the noise. `order` lists the points so that those near each other follow each other, and `groups` are the
-    /// means of each [`GROUP_SIZE`] of them. Where the median noise is below `min_median`, only clearly noisy parts count as
-    /// surfaces.
+    /// means of each [`GROUP_SIZE`] of them. If `is_auto`, only clearly noisy flat parts move where the median noise is small.
     ///
     /// # Errors
     ///
@@ -77,7 +78,7 @@ impl Noise {
         tree: &KdTree,
         groups: &KdTree,
         order: &[u32],
-        min_median: f32,
+        is_auto: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let [least, most] = REGION_SIZES;
@@ -98,10 +99,10 @@ impl Noise {
         let typical = |region: &Region| region.noise().map(|noise| noise.typical);
         let min_known = if is_amid_leaves { MIN_KNOWN_OF_SURFACE } else { MIN_KNOWN };
         let of_surfaces = regions.iter().filter(|region| region.is_known(min_known));
-        let is_smooth =
-            median(of_surfaces.filter_map(typical)).is_some_and(|median| median < min_median);
+        let median = median(of_surfaces.filter_map(typical));
+        let is_smooth = median.is_some_and(|median| median < MIN_NOISE);
         // Noisy parts amid leaves are plants.
-        let is_in_parts = is_smooth && !is_amid_leaves;
+        let is_in_parts = is_auto && is_smooth && !is_amid_leaves;
         let (min_known, min_noise) = match is_in_parts {
             true => (MIN_KNOWN_OF_SURFACE, MIN_NOISE_OF_PART),
             false => (min_known, 0.0),
@@ -110,7 +111,7 @@ impl Noise {
             centers: Vec::new(),
             noises: Vec::new(),
             of_surfaces: Vec::new(),
-            has_surfaces: false,
+            is_noisy: false,
             min_noise,
             is_at_rest: vec![false; order.len()],
         };
@@ -131,32 +132,31 @@ impl Noise {
             }
         }
         let n_surfaces = noise.of_surfaces.len() as f32;
-        noise.has_surfaces = match is_amid_leaves || is_in_parts {
-            true => MIN_SURFACE_REGIONS * regions.len() as f32 <= n_surfaces,
-            false => MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known,
+        noise.is_noisy = if is_in_parts || is_amid_leaves && !is_smooth {
+            (MIN_SURFACE_REGIONS * regions.len() as f32).max(1.0) <= n_surfaces
+        } else {
+            !is_smooth && MIN_KNOWN_WITHOUT_LEAVES * n_samples < n_known
         };
-        if is_smooth && !is_in_parts {
-            noise.has_surfaces = false;
-        }
         Ok(noise)
     }
 
     /// Returns the median noise over the regions of surfaces that are noisy enough to be denoised.
     pub fn median(&self) -> f32 {
-        self.quantile(0.5)
-    }
-
-    /// Returns the noise that this fraction of the regions of surfaces does not exceed.
-    pub fn quantile(&self, fraction: f64) -> f32 {
         let of_any = self.noises.iter().map(|noise| noise.typical);
-        quantile(self.of_surfaces.iter().copied(), fraction)
-            .or_else(|| quantile(of_any, fraction))
+        quantile(self.of_surfaces.iter().copied(), 0.5)
+            .or_else(|| quantile(of_any, 0.5))
             .unwrap_or(0.0)
     }
 
-    /// True if the cloud has noisy surfaces, not only leaves.
-    pub fn has_surfaces(&self) -> bool {
-        self.has_surfaces
+    /// Returns the noise of the ground, which has less than most surfaces: the first quartile over the regions whose noise is
+    /// known.
+    pub fn of_ground(&self) -> f32 {
+        quantile(self.noises.iter().map(|noise| noise.typical), 0.25).unwrap_or(0.0)
+    }
+
+    /// True if surfaces are so noisy that the cloud is denoised unasked.
+    pub fn is_noisy(&self) -> bool {
+        self.is_noisy
     }
 
     /// Returns the noise at a position, interpolated between the nearest regions.
@@ -316,7 +316,7 @@ mod tests {
     fn noisy_fraction(points: &[Vec3], is_asked: impl Fn(&Vec3) -> bool) -> f64 {
         let tree = KdTree::new(points, &NoProgress).unwrap();
         let order = tree.order();
-        let noise = Noise::new(&tree, &tree, &order, 0.0, &NoProgress).unwrap();
+        let noise = Noise::new(&tree, &tree, &order, false, &NoProgress).unwrap();
         let sorted: Vec<Vec3> = order.iter().map(|point| points[*point as usize]).collect();
         let tree = KdTree::new(&sorted, &NoProgress).unwrap();
         let fits = LocalFit::of_points(&tree, &NoProgress).unwrap();

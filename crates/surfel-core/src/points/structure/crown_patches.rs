@@ -3,7 +3,6 @@
 use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure};
 use super::solids::apply_structure;
-use super::vegetation::land_normal;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::neighbors::{KdTree, Neighbor};
@@ -31,8 +30,8 @@ const MIN_SCATTERED: f32 = 0.12;
 const MIN_ON_EACH_SIDE: f32 = 0.03;
 
 /// Makes scattered points of the patches of surface in crowns: small ones that lie amid scattered points. Level ones have more
-/// of these below than above. `wooded_land` is the normal of the land in a cloud with much vegetation, where steep patches of at most
-/// as many points as a neighbourhood has are scattered, too. `radii` are those of points of surfaces.
+/// of these below than above. In a cloud with much vegetation, which `is_wooded`, steep patches of at most as many points as a
+/// neighbourhood has are scattered, too. `up` is the normal of the land, and `radii` are those of points of surfaces.
 ///
 /// # Errors
 ///
@@ -40,15 +39,15 @@ const MIN_ON_EACH_SIDE: f32 = 0.03;
 pub fn scatter_crown_patches(
     tree: &KdTree,
     radii: &[f32],
-    wooded_land: Option<Vec3>,
+    up: Vec3,
+    is_wooded: bool,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
-    let up = wooded_land.unwrap_or_else(|| land_normal(tree.positions(), shapes));
     let patches = small_patches(tree, shapes, progress)?;
     let in_crown = |patch: &Vec<u32>| {
         progress.check()?;
-        let is_lone = wooded_land.is_some() && patch.len() <= MAX_LONE;
+        let is_lone = is_wooded && patch.len() <= MAX_LONE;
         let is_steep = is_steep(shapes, up, patch);
         Ok(is_lone && is_steep || is_amid_scattered(tree, shapes, up, is_steep, patch))
     };
@@ -122,6 +121,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::test_clouds::prepared;
     use crate::progress::NoProgress;
 
     /// Makes points of a kind with a normal, in a box about a position.
@@ -167,9 +167,10 @@ mod tests {
             ends.push(wood.positions.len());
         }
         let tree = KdTree::new(&wood.positions, &NoProgress).unwrap();
-        let scattered = |wooded_land: Option<Vec3>| {
+        let scattered = |is_wooded: bool| {
             let (radii, mut shapes) = (vec![1.0; wood.shapes.len()], wood.shapes.clone());
-            scatter_crown_patches(&tree, &radii, wooded_land, &mut shapes, &NoProgress).unwrap();
+            scatter_crown_patches(&tree, &radii, Vec3::Z, is_wooded, &mut shapes, &NoProgress)
+                .unwrap();
             let fraction = |of: usize| {
                 let part = &shapes[of.checked_sub(1).map_or(0, |before| ends[before])..ends[of]];
                 let is_scattered = |shape: &&PointShape| shape.structure == Structure::Scatter;
@@ -177,8 +178,29 @@ mod tests {
             };
             [0, 1, 2, 3, 4, 5, 6, 7].map(fraction)
         };
-        assert_eq!(scattered(Some(Vec3::Z)), [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(scattered(true), [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
         // On land with few plants a small steep patch may be of a wall.
-        assert_eq!(scattered(None), [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(scattered(false), [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn patches_in_the_crown_of_a_lone_tree_are_leaves_and_those_of_a_wall_are_not() {
+        let mut random = Random::new(4, 0);
+        let mut within =
+            |size: Vec3| size * Vec3::from_array([0; 3].map(|_| random.next_f32() - 0.5));
+        let mut points: Vec<Vec3> =
+            (0..20_000).map(|_| within(Vec3::new(60.0, 60.0, 0.01))).collect();
+        let (tree, wall) = (Vec3::new(0.0, 0.0, 14.0), Vec3::new(20.0, 0.0, 6.0));
+        let patch = Vec3::new(4.0, 0.01, 4.0);
+        points.extend((0..100).map(|_| tree + within(patch)));
+        points.extend((0..100).map(|_| wall + within(patch)));
+        points.extend((0..3000).map(|_| tree + within(Vec3::splat(10.0))));
+        let (_, structures) = prepared(points);
+        let n_scattered = |points: std::ops::Range<usize>| {
+            let structures = structures[points].iter();
+            structures.filter(|structure| **structure == Structure::Scatter).count()
+        };
+        let [of_tree, of_wall] = [20_000..20_100, 20_100..20_200].map(n_scattered);
+        assert!(90 < of_tree && of_wall < 10, "{of_tree} {of_wall}");
     }
 }

@@ -55,7 +55,8 @@ pub struct Evidence<'a> {
 }
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
-/// of them, and whether scattered points are leaves. `voters` are those of each point; if it is empty, they are searched where they are needed.
+/// of them, and whether scattered points are leaves. `voters` are those of each point; if it is empty, they are searched
+/// where they are needed.
 ///
 /// # Errors
 ///
@@ -119,10 +120,18 @@ pub fn find_structures(
         Ok(())
     };
     shapes.par_iter_mut().zip(&structures).enumerate().try_for_each(finish)?;
-    let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
-    let has_leaves = has_leaves(cloud, &structures, &shown, || rings.is_some());
-    if has_leaves {
-        scatter_crown_patches(tree, radii, land, &mut shapes, progress)?;
+    let have_leaves = |shapes: &[PointShape]| {
+        let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
+        let shown: Vec<f32> = shapes.iter().map(|shape| shape.radius).collect();
+        has_leaves(cloud, &structures, &shown, || rings.is_some())
+    };
+    let is_wooded = land.is_some();
+    if !is_elevation_grid && (is_wooded || have_leaves(&shapes)) {
+        let up = land.unwrap_or_else(|| match is_land {
+            true => Vec3::Z,
+            false => land_normal(positions, &shapes),
+        });
+        scatter_crown_patches(tree, radii, up, is_wooded, &mut shapes, progress)?;
     }
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
@@ -138,6 +147,7 @@ pub fn find_structures(
         None => clamp_solids(&mut shapes, Structure::Scatter, typical.radius, size),
     }
     limit_stray_points(tree, &mut shapes, progress)?;
+    let has_leaves = have_leaves(&shapes);
     Ok((shapes, has_leaves))
 }
 
