@@ -3,6 +3,7 @@
 
 use super::connected_parts::connected_parts;
 use super::point_shape::{PointShape, Structure, is_surface};
+use super::vegetation::count_scattered;
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
 use crate::points::neighbors::KdTree;
@@ -16,13 +17,15 @@ const N_NEIGHBORS: usize = 8;
 const MAX_RADIUS: f32 = 4.0;
 /// Distance of linked points in radii of either: stray points are farther.
 const MAX_LINK: f32 = 2.0;
-/// Minimum number of points of a part.
-const MIN_POINTS: usize = 16;
-/// Minimum fraction of the points of a part whose neighbours lie in a plane. Noise has 0.1 to 0.4.
-const MIN_EVEN: f32 = 0.5;
+/// Minimum number of points of a part, and the minimum fraction of those whose neighbours lie in a plane. Noise has 0.1 to 0.4.
+const OF_PARTS: (usize, f32) = (16, 0.5);
+/// The same of details, as the tip of a toe.
+const OF_DETAILS: (usize, f32) = (1, 0.25);
+/// Maximum fraction of scattered points in a cloud where these are details rather than noise.
+const MAX_SCATTERED: f32 = 0.1;
 
-/// Makes surfaces of the connected scattered points most of which lie in a plane with few neighbours. `radii` are those of
-/// points of surfaces.
+/// Makes surfaces of the connected scattered points half of which lie in a plane with few neighbours, and of details a quarter of
+/// which do, unless many points stay scattered. `radii` are those of points of surfaces.
 ///
 /// # Errors
 ///
@@ -30,6 +33,22 @@ const MIN_EVEN: f32 = 0.5;
 pub fn join_thin_parts(
     tree: &KdTree,
     radii: &[f32],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    join_parts(tree, radii, OF_PARTS, shapes, progress)?;
+    if count_scattered(shapes) as f32 <= MAX_SCATTERED * shapes.len() as f32 {
+        join_parts(tree, radii, OF_DETAILS, shapes, progress)?;
+    }
+    Ok(())
+}
+
+/// Makes surfaces of the connected scattered points that are at least so many and of which at least this fraction lies in a plane
+/// with few neighbours.
+fn join_parts(
+    tree: &KdTree,
+    radii: &[f32],
+    (min_points, min_even): (usize, f32),
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
@@ -48,12 +67,12 @@ pub fn join_thin_parts(
         Ok(fit_plane(positions, *point as usize, &neighbors))
     };
     let even_fits = |part: &Vec<u32>| -> Result<Option<Vec<PlaneFit>>> {
-        if part.len() < MIN_POINTS {
+        if part.len() < min_points {
             return Ok(None);
         }
         let fits = part.par_iter().map(fit).collect::<Result<Vec<_>>>()?;
         let n_even = fits.iter().filter(|fit| is_surface(fit)).count();
-        Ok((MIN_EVEN * part.len() as f32 <= n_even as f32).then_some(fits))
+        Ok((min_even * part.len() as f32 <= n_even as f32).then_some(fits))
     };
     let fits = parts.par_iter().map(even_fits).collect::<Result<Vec<_>>>()?;
     for (part, fits) in parts.iter().zip(fits) {
@@ -109,6 +128,42 @@ mod tests {
             Vec3::new(x, y, point.z + z)
         };
         assert!(n_of_surface(hand(filled)) < 40);
+    }
+
+    #[test]
+    fn a_small_bump_of_a_surface_is_a_detail_and_one_amid_noise_is_not() {
+        // A grid with a bump of nine points, and points that fill a box.
+        let grid = (0..900).map(|i| {
+            let [x, y] = [i % 30, i / 30];
+            let is_bump = (14..17).contains(&x) && (14..17).contains(&y);
+            Vec3::new(x as f32, y as f32, if is_bump { 0.7 } else { 0.0 })
+        });
+        let grid: Vec<Vec3> = grid.collect();
+        let mut random = Random::new(6, 0);
+        let mut noise: Vec<Vec3> = (0..300)
+            .map(|_| 6.0 * Vec3::from_array([0; 3].map(|_| random.next_f32())) + 50.0 * Vec3::Z)
+            .collect();
+        let n_scattered = |points: Vec<Vec3>| {
+            let tree = KdTree::new(&points, &NoProgress).unwrap();
+            let is_scattered = |point: &Vec3| 0.5 < point.z;
+            let shape = |point: &Vec3| PointShape {
+                structure: if is_scattered(point) {
+                    Structure::Scatter
+                } else {
+                    Structure::Surface
+                },
+                normal: Vec3::Z,
+                radius: 2.0,
+            };
+            let mut shapes: Vec<PointShape> = points.iter().map(shape).collect();
+            join_thin_parts(&tree, &vec![2.0; points.len()], &mut shapes, &NoProgress).unwrap();
+            let bump =
+                shapes.iter().zip(&points).filter(|(_, point)| (0.5..9.0).contains(&point.z));
+            bump.filter(|(shape, _)| shape.structure == Structure::Scatter).count()
+        };
+        assert_eq!(n_scattered(grid.clone()), 0);
+        noise.extend(grid);
+        assert_eq!(n_scattered(noise), 9);
     }
 
     #[test]
