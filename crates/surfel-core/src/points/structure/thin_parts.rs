@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
 use crate::points::neighbors::KdTree;
 use crate::points::normals::planes::{PlaneFit, fit_plane};
+use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -61,26 +62,28 @@ fn join_parts(
         positions[point].distance(positions[other]) < reach
     };
     let parts = connected_parts(tree, is_scattered, is_linked, progress)?;
-    let fit = |point: &u32| -> Result<PlaneFit> {
+    // Each plane with the distance to the last of its points.
+    let fit = |point: &u32| -> Result<(PlaneFit, f32)> {
         progress.check()?;
         let neighbors = tree.nearest(positions[*point as usize], N_NEIGHBORS, Some(*point));
-        Ok(fit_plane(positions, *point as usize, &neighbors))
+        let fit = fit_plane(positions, *point as usize, &neighbors);
+        Ok((fit, kth_distance(&neighbors, N_NEIGHBORS)))
     };
-    let even_fits = |part: &Vec<u32>| -> Result<Option<Vec<PlaneFit>>> {
+    let even_fits = |part: &Vec<u32>| -> Result<Option<Vec<(PlaneFit, f32)>>> {
         if part.len() < min_points {
             return Ok(None);
         }
         let fits = part.par_iter().map(fit).collect::<Result<Vec<_>>>()?;
-        let n_even = fits.iter().filter(|fit| is_surface(fit)).count();
+        let n_even = fits.iter().filter(|(fit, _)| is_surface(fit)).count();
         Ok((min_even * part.len() as f32 <= n_even as f32).then_some(fits))
     };
     let fits = parts.par_iter().map(even_fits).collect::<Result<Vec<_>>>()?;
     for (part, fits) in parts.iter().zip(fits) {
-        for (point, fit) in part.iter().zip(fits.into_iter().flatten()) {
+        for (point, (fit, reach)) in part.iter().zip(fits.into_iter().flatten()) {
             let point = *point as usize;
             if fit.normal != Vec3::ZERO {
-                let (structure, normal, radius) = (Structure::Surface, fit.normal, radii[point]);
-                shapes[point] = PointShape { structure, normal, radius };
+                let (structure, radius) = (Structure::Surface, radii[point].min(reach));
+                shapes[point] = PointShape { structure, normal: fit.normal, radius };
             }
         }
     }
