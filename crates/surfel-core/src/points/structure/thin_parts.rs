@@ -20,7 +20,7 @@ const MAX_RADIUS: f32 = 4.0;
 const MAX_LINK: f32 = 2.0;
 /// Minimum number of points of a part, and the minimum fraction of those whose neighbours lie in a plane. Noise has 0.1 to 0.4.
 const OF_PARTS: (usize, f32) = (16, 0.5);
-/// The same of details, as the tip of a toe.
+/// Minimum number of points and minimum fraction for details, as the tip of a toe.
 const OF_DETAILS: (usize, f32) = (1, 0.25);
 /// Maximum fraction of scattered points in a cloud where these are details rather than noise.
 const MAX_SCATTERED: f32 = 0.1;
