@@ -47,6 +47,8 @@ const MIN_NOISE: f32 = 0.15;
 /// Least noise, in spacings, of a flat part that is denoised in a cloud with less noise elsewhere. Smoother stone would lose its
 /// relief.
 const MIN_NOISE_OF_PART: f32 = 0.25;
+/// Minimum number of points in a region of such a part: small ones of a coarse figure have features that look like noise.
+const MIN_PART_SIZE: usize = 1024;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
 
@@ -102,7 +104,7 @@ impl Noise {
         let median = median(of_surfaces.filter_map(typical));
         let is_smooth = median.is_some_and(|median| median < MIN_NOISE);
         // Noisy parts amid leaves are plants.
-        let is_in_parts = is_auto && is_smooth && !is_amid_leaves;
+        let is_in_parts = is_auto && is_smooth && !is_amid_leaves && MIN_PART_SIZE <= size;
         let (min_known, min_noise) = match is_in_parts {
             true => (MIN_KNOWN_OF_SURFACE, MIN_NOISE_OF_PART),
             false => (min_known, 0.0),
