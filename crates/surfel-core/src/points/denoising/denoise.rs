@@ -496,7 +496,7 @@ mod tests {
         let mut random = Random::new(5, 0);
         let mut between = |low: f32, high: f32| low + (high - low) * random.next_f32();
         let ground = noisy_grid(400, 400, 0.05);
-        let wall = noisy_grid(300, 200, 0.4);
+        let wall = noisy_grid(300, 300, 0.4);
         let wall = wall.into_iter().map(|p| Vec3::new(p.x, 20.0 + p.z, 5.0 + p.y));
         let crowns = (0..140_000)
             .map(|_| Vec3::new(between(0.0, 100.0), between(100.0, 200.0), between(9.0, 109.0)));
