@@ -10,5 +10,6 @@ pub mod flat_faces;
 pub mod noise_at_point;
 pub mod noise;
 pub mod plants;
+pub mod bilateral_normals;
 pub mod denoise;
 pub mod line_axes;
